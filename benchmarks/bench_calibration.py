@@ -20,6 +20,8 @@ from station.calibration.calibration_procedure import CalibrationProcedure, Draf
 from station.calibration.errors import RefusedError
 from station.calibration.rig import Place, Unit
 from station.calibration.verification_procedure import VerificationProcedure
+from station.press.procedure import take_step
+from station.press.reference import take_reference
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import Recipe, find_recipe
 from station.settings.segmentation import Segmentation
@@ -27,7 +29,6 @@ from station.studies.simulated_rig import SimulatedRig
 from station.twin.digit.sensor import Image
 from station.vision.methods import make_method, median_image
 from station.vision.scale import TYPICAL_MM_PER_PX
-from station.vision.step import mean_image
 
 REPEATS = 14
 WIDTHS_MM = range(42, 34, -1)
@@ -43,11 +44,11 @@ Step = tuple[float, Image]
 
 async def press(ball: SimulatedRig) -> tuple[list[Image], list[Step]]:
     """The paper's widths: the untouched gel's frames, then each width's mean image."""
-    references = list(await ball.untouched(5))
+    references = (await take_reference(ball, 5)).images
     steps = []
     for width_mm in WIDTHS_MM:
-        pressed = await ball.press_to(width_mm)
-        steps.append((pressed.width_mm, mean_image(pressed.frames)))
+        pressed = await take_step(ball, find_recipe("rubber_ball"), 0, width_mm)
+        steps.append((pressed.move.width_mm, pressed.image))
     return references, steps
 
 

@@ -44,9 +44,10 @@ from station.commands.simulated_unit import calibrate_simulated_unit
 from station.devices.arm.ur import UrArm
 from station.devices.camera.open import camera_from
 from station.devices.gripper.robotiq import make_gripper
-from station.press.procedure import FINEST_STEP_MM, MOST_UNSEEN_MM, Cell, Grip, at_once
+from station.press.stop import MOST_UNSEEN_MM
 from station.records.model import FullRecord
 from station.records.records import Records
+from station.runtime.devices.rig import FINEST_STEP_MM, Cell, DeviceRig, at_once
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.plc import line_endpoint
 from station.settings.recipe import Recipe, load_recipes
@@ -241,7 +242,7 @@ Spent = dict[str, list[tuple[Inspected, dict[str, float], Stopwatch]]]
 
 async def bare(configuration: Configuration, cell: Cell, recipe: Recipe, record: FullRecord) -> Stopwatch:
     """The same moves, waits and frames as in an inspection, and nothing else."""
-    grip, watch, imaging = Grip(cell, recipe), Stopwatch(), recipe.imaging
+    grip, watch, imaging = DeviceRig(cell, recipe), Stopwatch(), recipe.imaging
     judged = record.judged
     if judged is None or not judged.curve:
         raise SystemExit(f"inspection {record.sequence} was not measured: {judged and judged.explanation}")
@@ -249,7 +250,7 @@ async def bare(configuration: Configuration, cell: Cell, recipe: Recipe, record:
     around_mm = min(recipe.expected_width.largest_mm + configuration.arm.jaw_clearance_mm, cell.gripper.max_width_mm)
 
     async def frames() -> None:
-        await grip.sound_frames(imaging.reference_frames)
+        await grip.frames(imaging.reference_frames)
 
     async def arrive() -> None:
         await at_once(grip.go("above_nest", "nest"), cell.gripper.open(around_mm), frames())
@@ -258,17 +259,17 @@ async def bare(configuration: Configuration, cell: Cell, recipe: Recipe, record:
     await watch.time("approach", "motion", arrive())
     overshoot_mm = float(judged.measures.get("overshoot_mm") or 0.0)
     await watch.time("onset", "motion", grip.close_to(onset_mm - overshoot_mm))
-    await watch.time("onset", "camera", grip.sound_frames(1))
+    await watch.time("onset", "camera", grip.frames(1))
     await watch.time("onset", "motion", cell.gripper.open(onset_mm + 2 * FINEST_STEP_MM))
     for counts in (2, 1):
         await watch.time("onset", "motion", grip.close_to(onset_mm + counts * FINEST_STEP_MM))
-        await watch.time("onset", "camera", grip.sound_frames(1))
+        await watch.time("onset", "camera", grip.frames(1))
     await watch.time("onset", "motion", grip.close_to(onset_mm))
-    await watch.time("onset", "camera", grip.sound_frames(imaging.frames_per_step))
+    await watch.time("onset", "camera", grip.frames(imaging.frames_per_step))
     for number in range(1, len(judged.curve)):
         await watch.time("steps", "motion", grip.close_to(onset_mm - number * recipe.steps.step_mm))
         await watch.time("steps", "settling", asyncio.sleep(imaging.settle_s))
-        await watch.time("steps", "camera", grip.sound_frames(imaging.frames_per_step))
+        await watch.time("steps", "camera", grip.frames(imaging.frames_per_step))
     await watch.time("release", "motion", cell.gripper.open(around_mm))
     await at_once(grip.go("above_nest"), cell.gripper.open())
     return watch

@@ -21,8 +21,8 @@ from station.inspection.press import Press
 from station.inspection.sized_limits import sized_limits
 from station.inspection.uncertainty import budget_at
 from station.settings.gripper import GripperCalibration
-from station.settings.recipe import find_recipe
-from station.studies.gauge_grip import Grip, Onset
+from station.settings.recipe import Recipe, find_recipe
+from station.studies.gauge_grip import FruitRig, Grip, Onset
 from station.studies.workers import on_this_machine
 from station.vision.contact import Contact
 from station.vision.press import PressTracker
@@ -35,27 +35,30 @@ JITTER_S = 0.005
 """Standard deviation of a frame's time against the gripper's reading: USB frames are stamped when they have come."""
 
 
-class SweptGrip(Grip):
-    """A grip that closes on without a stop."""
+def swept(
+    grip: Grip, rig: FruitRig, recipe: Recipe, onset: Onset, deepest_mm: float, generator: np.random.Generator
+) -> Iterator[tuple[float, Contact]]:
+    """Close from the onset at the recipe's speed without a stop, one frame after the other.
 
-    def sweep(self, onset: Onset, deepest_mm: float, generator: np.random.Generator) -> Iterator[tuple[float, Contact]]:
-        """Close from the onset at the recipe's speed, one frame after the other.
+    Args:
+        grip: whose reference the frames are measured against.
+        rig: with the fruit.
+        recipe: its speed.
+        onset: where the closing counts from.
+        deepest_mm: the last closing.
+        generator: of the frames' phase and jitter.
 
-        Args:
-            onset: where the closing counts from.
-            deepest_mm: the last closing.
-            generator: of the frames' phase and jitter.
-
-        Yields:
-            The closing as it is known, mm, and the contact.
-        """
-        speed_mm_s = self._recipe.gripper.speed_mm_s
-        tracker = PressTracker(self._method, self._recipe.segmentation.robust.least_confidence, first=onset.contact)
-        closing_mm = float(generator.uniform(0.0, speed_mm_s * FRAME_S))
-        while closing_mm < deepest_mm + speed_mm_s * FRAME_S:
-            known_mm = closing_mm + speed_mm_s * float(generator.normal(0.0, JITTER_S))
-            yield known_mm, tracker.measure_step(self._frames(onset.width_mm - closing_mm, 1))
-            closing_mm += speed_mm_s * FRAME_S
+    Yields:
+        The closing as it is known, mm, and the contact.
+    """
+    speed_mm_s = recipe.gripper.speed_mm_s
+    tracker = PressTracker(grip.method, recipe.segmentation.robust.least_confidence, first=onset.contact)
+    closing_mm = float(generator.uniform(0.0, speed_mm_s * FRAME_S))
+    while closing_mm < deepest_mm + speed_mm_s * FRAME_S:
+        known_mm = closing_mm + speed_mm_s * float(generator.normal(0.0, JITTER_S))
+        frame = rig.images_at(onset.width_mm - closing_mm, 1)[0]
+        yield known_mm, tracker.measure_step([frame.image])
+        closing_mm += speed_mm_s * FRAME_S
 
 
 class Pair(NamedTuple):
@@ -81,20 +84,24 @@ def compare(task: Task) -> list[Pair]:
     one, recipe = draw(task), find_recipe(task.kind)
     pose = one.pose
 
-    def begun() -> tuple[SweptGrip, Onset | None]:
-        grip = SweptGrip(recipe, one.fruit, pose, one.unit, one.noise_seed, one.mm_per_px)
-        return grip, grip.approach(one.phase)
+    def begun() -> tuple[Grip, FruitRig, Onset | None]:
+        rig = FruitRig(one.fruit, pose, one.unit, one.noise_seed, one.mm_per_px)
+        grip = Grip(recipe, rig)
+        return grip, rig, grip.approach(one.phase)
 
     closings_mm = [limit.closing_mm for limit in recipe.damage.area]
-    (stepped, onset), (swept, _) = begun(), begun()
+    (stepped, _, onset), (grip, rig, _) = begun(), begun()
     if onset is None:
         return []
-    steps = []
-    for step in stepped.steps(onset):
-        steps.append(step)
-        if step[0] > closings_mm[-1]:
-            break
-    frames = [(0.0, onset.contact), *swept.sweep(onset, closings_mm[-1], np.random.default_rng(one.noise_seed))]
+    steps: list[tuple[float, Contact]] = []
+
+    def goes_on(closing_mm: float, contact: Contact) -> bool:
+        steps.append((closing_mm, contact))
+        return closing_mm <= closings_mm[-1]
+
+    stepped.close(onset, goes_on)
+    on_the_way = swept(grip, rig, recipe, onset, closings_mm[-1], np.random.default_rng(one.noise_seed))
+    frames = [(0.0, onset.contact), *on_the_way]
     size = FruitSize(length_mm=one.graded_mm)
     count_mm = GripperCalibration().mm_per_count
     press = Press(onset.width_mm, onset.uncertainty_mm, (), (), size, count_mm, CALIBRATION_SD)

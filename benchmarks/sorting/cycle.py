@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 
 from station.inspection.centring import Way, too_far
 from station.inspection.fruit_size import FruitSize
-from station.inspection.judge import early_stop, judge
+from station.inspection.judge import judge
 from station.inspection.press import Measured, Press
 from station.inspection.second_press import needs_second_press, together
+from station.press.stop import ends_steps
 from station.settings.arm import ArmSettings
 from station.settings.gripper import GripperCalibration
 from station.settings.recipe_model import Recipe
@@ -153,7 +154,7 @@ def as_stopped(
     )
     for step in pressed.steps:
         press = replace(press, points=(*press.points, _measured(step, mm_per_px)))
-        if early_stop(together([*earlier, press]), recipe) is not None:
+        if ends_steps(together([*earlier, press]), recipe):
             break
     return press, len(press.points)
 

@@ -13,10 +13,11 @@ import cv2
 
 import station
 from station.settings.recipe import find_recipe
-from station.studies.gauge_grip import Grip
+from station.studies.gauge_grip import FruitRig, Grip
 from station.studies.workers import on_this_machine
 from station.twin.gel import SENSOR_SHAPE, Gel
 from station.twin.squeeze import Squeeze
+from station.vision.contact import Contact
 
 from .specimens import SOUND, Task, draw
 
@@ -29,6 +30,7 @@ PRESSED_ON = 100
 _KEEP_EVERY_S = 20.0
 _DECIDED_BY = (
     "vision",
+    "press",
     "studies/gauge_grip.py",
     *(
         f"twin/{name}"
@@ -80,17 +82,19 @@ def press(closing: Closing) -> tuple[Closing, Pressed]:
     one, recipe = draw(closing.task), find_recipe(closing.task.kind)
     x_mm, y_mm = closing.shift_mm
     pose = replace(one.pose, x_px=one.pose.x_px + x_mm / one.mm_per_px, y_px=one.pose.y_px + y_mm / one.mm_per_px)
-    grip = Grip(recipe, one.fruit, pose, one.unit, one.noise_seed + closing.number, one.mm_per_px)
+    grip = Grip(recipe, FruitRig(one.fruit, pose, one.unit, one.noise_seed + closing.number, one.mm_per_px))
     onset = grip.approach(one.phase)
     if onset is None:
         return closing, Pressed(None, 0.0, ())
     squeeze = Squeeze(one.fruit, Gel(mm_per_px=one.mm_per_px))
     middle_x, middle_y = ((side - 1) / 2 for side in SENSOR_SHAPE[::-1])
     pressed_on = closing.number == 0 and closing.task.group == SOUND and closing.task.number < PRESSED_ON
-    deepest_mm, steps = _EARLY_STOP_MM if pressed_on else _DEEPEST_MM, []
-    for closing_mm, contact in grip.steps(onset):
+    deepest_mm = _EARLY_STOP_MM if pressed_on else _DEEPEST_MM
+    steps: list[Step] = []
+
+    def goes_on(closing_mm: float, contact: Contact) -> bool:
         if closing_mm > deepest_mm:
-            break
+            return False
         centre = contact.centroid_px
         steps.append(
             Step(
@@ -102,6 +106,9 @@ def press(closing: Closing) -> tuple[Closing, Pressed]:
                 squeeze.at(one.fruit.width_mm - onset.width_mm + closing_mm).force_n,
             )
         )
+        return True
+
+    grip.close(onset, goes_on)
     return closing, Pressed(onset.width_mm + one.zero_mm, onset.uncertainty_mm, tuple(steps))
 
 

@@ -7,7 +7,7 @@ it gives no scale. A scale needs a known length on the gel: the distance from on
 import asyncio
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import combinations
 from math import hypot
@@ -19,7 +19,7 @@ from station.calibration.errors import RefusedError
 from station.calibration.figures import MeasuredScale
 from station.calibration.model import Calibration, Check, Noise, PlacePoint, stamp
 from station.calibration.press import BallPress, Step
-from station.calibration.rig import OnProgress, Place, Progress, Rig, Unit
+from station.calibration.rig import BallRig, OnProgress, Place, Progress, Unit
 from station.errors import BadInputError, StationError
 from station.messages import calibration as messages
 from station.messages.message import Definition, Message
@@ -81,7 +81,7 @@ class CalibrationProcedure:
 
     def __init__(
         self,
-        rig: Rig,
+        rig: BallRig,
         unit: Unit,
         recipe: Recipe,
         settings: CalibrationSettings,
@@ -128,7 +128,8 @@ class CalibrationProcedure:
 
     async def _measure(self) -> _Measured:
         self._say(messages.STEP_UNTOUCHED, 1, 1, messages.FRAMES(number=NOISE_FRAMES))
-        frames = await self._press.take_reference(NOISE_FRAMES)
+        taken = await self._press.take_reference(NOISE_FRAMES)
+        frames = taken.images
         reference = self._press.reference
         assert reference is not None  # noqa: S101 (taken just now)
         findings = await asyncio.to_thread(gel.examine, reference, None, self._settings.least_light)
@@ -138,7 +139,8 @@ class CalibrationProcedure:
             )
         if max(await asyncio.to_thread(lambda: figures.pixel_noise(frames).mean(axis=(0, 1)))) == 0:
             raise RefusedError(messages.FRAMES_EQUAL())
-        untouched = [await self._press.measure([frame]) for frame in frames[:: max(1, len(frames) // 6)]]
+        some = taken.frames[:: max(1, len(frames) // 6)]
+        untouched = [(await self._press.measure(replace(taken, frames=(frame,)))).contact for frame in some]
         steps = await self._press_through()
         first = next(step for step in steps if step.contact.is_firm)
         before = [step for step in steps if step.width_mm > first.width_mm]

@@ -1,7 +1,6 @@
 """Ball press: presses the ball step by step and measures it, for calibration and verification."""
 
 import asyncio
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -9,17 +8,19 @@ import numpy as np
 
 from station.calibration.gate import gated
 from station.calibration.model import PressPoint
-from station.calibration.rig import Pressed, Rig
+from station.calibration.rig import BallRig
 from station.messages import calibration as messages
 from station.messages.message import Message
+from station.press.measurement import PressMeasurement
+from station.press.procedure import bracketed_onset_mm, take_step
+from station.press.reference import reference_image, take_reference
+from station.press.rig import MeasuredStep
+from station.press.rig import Step as PressStep
 from station.settings.recipe import Recipe
-from station.vision.contact import Contact, Image, Method
-from station.vision.methods import make_method, median_image
-from station.vision.step import mean_image, measure_step
+from station.vision.contact import Contact, Image
+from station.vision.methods import make_method
 from station.vocabulary import Flag
 
-FINEST_STEP_MM = 0.4
-"""A count of the gripper."""
 _CONTRAST_BLUR_PX = 2.0
 _CONTRAST_PERCENTILE = 90.0
 _ROOM = 1.2
@@ -58,38 +59,32 @@ class Step:
 class BallPress:
     """Presses and measures by a recipe."""
 
-    def __init__(self, rig: Rig, recipe: Recipe, gate_factor: float = 1.0) -> None:
+    def __init__(self, rig: BallRig, recipe: Recipe, gate_factor: float = 1.0) -> None:
         self._rig, self._recipe = rig, recipe
         self._segmentation = gated(recipe.segmentation, gate_factor)
-        self._method: Method | None = None
+        self._measurement: PressMeasurement | None = None
         self.reference: Image | None = None
 
-    async def take_reference(self, number: int) -> Sequence[Image]:
+    async def take_reference(self, number: int) -> PressStep:
         """Take frames of the untouched gel, and measure against their median from now on."""
-        frames = await self._rig.untouched(number)
-        self.reference = await asyncio.to_thread(median_image, frames)
-        self._method = await asyncio.to_thread(make_method, [self.reference], self._segmentation)
-        return frames
+        untouched = await take_reference(self._rig, number)
+        self.reference = await asyncio.to_thread(reference_image, untouched.frames)
+        method = await asyncio.to_thread(make_method, [self.reference], self._segmentation)
+        self._measurement = PressMeasurement(method, self._recipe.segmentation.robust.least_confidence)
+        return untouched
 
-    async def measure(self, frames: Sequence[Image]) -> Contact:
-        """Measure frames of one width.
-
-        Args:
-            frames: of the reference's shape.
-        """
-        if self._method is None:
+    async def measure(self, step: PressStep) -> MeasuredStep:
+        """Measure a step by itself."""
+        if self._measurement is None:
             raise RuntimeError("a press is measured before its reference was taken")
-        least = self._recipe.segmentation.robust.least_confidence
-        return await asyncio.to_thread(measure_step, self._method, frames, least)
+        return await asyncio.to_thread(self._measurement.measure, step)
 
     async def step(self, width_mm: float) -> Step:
         """Move to a width and measure there."""
-        pressed: Pressed = await self._rig.press_to(width_mm)
-        contact = await self.measure(pressed.frames)
-        image = mean_image(pressed.frames)
+        seen = await self.measure(await take_step(self._rig, self._recipe, 0, width_mm))
         assert self.reference is not None  # noqa: S101 (measured against it just now)
-        strength = await asyncio.to_thread(contrast, image, self.reference, contact)
-        return Step(pressed.width_mm, image, contact, strength)
+        strength = await asyncio.to_thread(contrast, seen.image, self.reference, seen.contact)
+        return Step(seen.step.move.width_mm, seen.image, seen.contact, strength)
 
     async def fine_onset(self, untouched_mm: float, touched_mm: float) -> float:
         """Search the contact onset, to a count of the gripper.
@@ -98,13 +93,7 @@ class BallPress:
             untouched_mm: a width without contact.
             touched_mm: a smaller one with contact.
         """
-        width_mm = untouched_mm - FINEST_STEP_MM
-        while width_mm > touched_mm + FINEST_STEP_MM / 2:
-            step = await self.step(width_mm)
-            if step.contact.is_firm:
-                return step.width_mm
-            width_mm -= FINEST_STEP_MM
-        return touched_mm
+        return await bracketed_onset_mm(self._rig, self._recipe, untouched_mm, touched_mm, self.measure)
 
 
 def contrast(image: Image, reference: Image, contact: Contact) -> float:

@@ -1,11 +1,11 @@
 """Calibration rig: the interface through which a procedure presses a ball."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from station.messages.message import Message
-from station.vision.contact import Image
+from station.press.rig import Rig
 
 
 class Place(NamedTuple):
@@ -24,26 +24,8 @@ class Unit:
     simulated: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Pressed:
-    """Frames at one width."""
-
-    width_mm: float
-    """Measured."""
-    frames: Sequence[Image]
-    """Frames without faults, all captured after the fingers had come to rest."""
-
-
-class Rig(Protocol):
-    """Gripper and camera with a ball between them."""
-
-    async def untouched(self, number: int) -> Sequence[Image]:
-        """Open the jaws and take frames of the untouched gel."""
-        ...
-
-    async def press_to(self, width_mm: float) -> Pressed:
-        """Move to a width, let the gel settle, take a step's frames."""
-        ...
+class BallRig(Rig, Protocol):
+    """A press rig with a ball between its fingers."""
 
     async def lay(self, place: Place) -> None:
         """Have the ball laid at another place, with the jaws open; returns once it is there.
@@ -51,10 +33,6 @@ class Rig(Protocol):
         Args:
             place: relative to the first place.
         """
-        ...
-
-    async def release(self) -> None:
-        """Open the jaws in any case; raises the reason if they remain closed."""
         ...
 
 

@@ -11,7 +11,7 @@ from station.calibration.checks import verification_checks
 from station.calibration.gel import REMEDIES, Finding, GelFault
 from station.calibration.model import Calibration, Check, Verification, stamp
 from station.calibration.press import BallPress, Step
-from station.calibration.rig import OnProgress, Progress, Rig
+from station.calibration.rig import BallRig, OnProgress, Progress
 from station.calibration.store import press_name
 from station.errors import StationError
 from station.messages import calibration as messages
@@ -54,7 +54,7 @@ class VerificationProcedure:
 
     def __init__(
         self,
-        rig: Rig,
+        rig: BallRig,
         recipe: Recipe,
         settings: CalibrationSettings,
         calibration: Calibration,
@@ -87,7 +87,7 @@ class VerificationProcedure:
 
     async def _run(self) -> VerificationResult:
         self._on_progress(Progress(1, 1, messages.STEP_UNTOUCHED(), messages.FRAMES(number=_NOISE_FRAMES)))
-        frames = await self._press.take_reference(_NOISE_FRAMES)
+        frames = (await self._press.take_reference(_NOISE_FRAMES)).images
         reference = self._press.reference
         assert reference is not None  # noqa: S101 (taken just now)
         findings = await asyncio.to_thread(gel.examine, reference, self._golden, self._settings.least_light)

@@ -16,12 +16,11 @@ from station.devices.arm.ur import UrArm
 from station.devices.camera.open import camera_from
 from station.devices.gripper.robotiq import make_gripper
 from station.errors import BadInputError
-from station.press.procedure import Cell
 from station.records.database import records_folder
 from station.records.errors import LockedError
 from station.records.open import lock_folder
-from station.runtime.devices.bare_grip import renewed_lease
-from station.runtime.devices.calibration_rig import StationRig
+from station.runtime.devices.calibration_rig import CalibrationRig
+from station.runtime.devices.rig import Cell, renewed_lease
 from station.settings.configuration import Configuration
 from station.settings.recipe import Recipe, find_recipe
 
@@ -29,7 +28,9 @@ _ARM_DEADLINE_S = 15.0
 
 
 @contextlib.asynccontextmanager
-async def open_rig(site: Configuration, *, bench: bool, yes: bool) -> AsyncIterator[tuple[StationRig, Unit, Recipe]]:
+async def open_rig(
+    site: Configuration, *, bench: bool, yes: bool
+) -> AsyncIterator[tuple[CalibrationRig, Unit, Recipe]]:
     """Open the devices that the site names, for this program alone.
 
     Args:
@@ -72,7 +73,7 @@ async def open_rig(site: Configuration, *, bench: bool, yes: bool) -> AsyncItera
                 f"the jaws will move: see that the gel is clean, {ball}, and hands are away; then press Enter"
             )
         unit = Unit(description.serial, description.name, simulated=site.camera.driver != "digit")
-        yield StationRig(Cell(camera, gripper, arm), recipe, lay, site.service.patience), unit, recipe
+        yield CalibrationRig(Cell(camera, gripper, arm), recipe, lay, site.service.patience), unit, recipe
 
 
 async def _wait_for_enter(request: str) -> None:

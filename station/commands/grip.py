@@ -14,12 +14,15 @@ import numpy as np
 import numpy.typing as npt
 
 from station.devices.arm.ur import UrArm
-from station.devices.camera.interface import Image
+from station.devices.camera.interface import Camera, Image
 from station.devices.camera.open import camera_from
 from station.devices.camera.twin import TwinCamera
 from station.devices.gripper.robotiq import make_gripper
 from station.errors import BadInputError
-from station.runtime.devices.bare_grip import BareGrip, Cell, GripStep
+from station.press.measurement import PressMeasurement
+from station.press.procedure import press
+from station.press.rig import MeasuredStep, Step
+from station.runtime.devices.rig import Cell, DeviceRig, renewed_lease
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.recipe import Recipe, find_recipe
 from station.vision.methods import make_method
@@ -65,16 +68,8 @@ async def _grip(configuration: Configuration, recipe: Recipe, recording: "_Recor
             arm = await stack.enter_async_context(UrArm(configuration.arm))
             await arm.ready(_ARM_DEADLINE_S)
 
-        async def keep(step: GripStep) -> None:
-            mask = await camera.true_mask(step.last_frame) if isinstance(camera, TwinCamera) else None
-            recording.add(step, mask)
-            touched = "approach" if step.number < 0 else f"step {step.number}"
-            click.echo(f"{touched:9} width {step.move.width_mm:6.2f} mm  {step.move.reading.object_state}")
-
-        def method(references: Sequence[Image]):  # noqa: ANN202 (the room's own protocol)
-            return make_method(references, recipe.segmentation)
-
-        await BareGrip(Cell(camera, gripper, arm), recipe, method, recording.add_references, keep).run()
+        async with renewed_lease(arm):
+            await press(DeviceRig(Cell(camera, gripper, arm), recipe), recipe, _Observer(recipe, camera, recording))
     if called_off.is_set():  # too late to be cut short
         raise asyncio.CancelledError
 
@@ -92,6 +87,33 @@ def _cancelled_by_signal() -> asyncio.Event:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, call_off)
     return called_off
+
+
+class _Observer:
+    """Writes every step, and finds the contact onset by the recipe's method."""
+
+    def __init__(self, recipe: Recipe, camera: Camera, recording: "_Recording") -> None:
+        self._recipe, self._camera, self._recording = recipe, camera, recording
+        self._measurement: PressMeasurement | None = None
+
+    async def see_reference(self, untouched: Step) -> None:
+        self._recording.add_references(untouched.images)
+        segmentation = self._recipe.segmentation
+        method = await asyncio.to_thread(make_method, untouched.images, segmentation)
+        self._measurement = PressMeasurement(method, segmentation.robust.least_confidence)
+
+    async def measure(self, step: Step) -> MeasuredStep:
+        assert self._measurement is not None  # noqa: S101 (the reference comes first)
+        return await asyncio.to_thread(self._measurement.measure, step)
+
+    async def see_step(self, step: Step) -> bool:
+        twin = self._camera if isinstance(self._camera, TwinCamera) else None
+        frame = step.last_frame
+        mask = await twin.true_mask(frame.sequence, frame.image.shape) if twin is not None else None
+        self._recording.add(step, mask)
+        touched = "approach" if step.number < 0 else f"step {step.number}"
+        click.echo(f"{touched:9} width {step.move.width_mm:6.2f} mm  {step.move.state}")
+        return True
 
 
 class _Recording:
@@ -117,7 +139,7 @@ class _Recording:
         for number, image in enumerate(references):
             self._write(f"reference/reference_{number}.png", image)
 
-    def add(self, step: GripStep, mask: npt.NDArray[np.uint8] | None) -> None:
+    def add(self, step: Step, mask: npt.NDArray[np.uint8] | None) -> None:
         """Write a step: picture, true mask if known, and a row of the table.
 
         Args:
@@ -127,14 +149,14 @@ class _Recording:
         self._write(f"frames/{name}", step.image)
         if mask is not None:
             self._write(f"truth/{name}", mask)
-        reading = step.move.reading
+        move = step.move
         self._rows.append(
             (
                 name,
-                f"{reading.width_mm:.3f}",
-                f"{step.move.requested_width_mm:.3f}",
-                reading.object_state.value,
-                "" if reading.current_a is None else f"{reading.current_a:.2f}",
+                f"{move.width_mm:.3f}",
+                "" if move.requested_mm is None else f"{move.requested_mm:.3f}",
+                move.state,
+                "" if move.current_a is None else f"{move.current_a:.2f}",
                 f"{step.last_frame.captured_s:.4f}",
             )
         )

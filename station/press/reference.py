@@ -1,24 +1,89 @@
-"""Reference check: whether a picture of the untouched gel may be the reference of a measurement."""
+"""Reference: how the untouched gel is captured, and whether its picture may be the reference of a measurement.
 
+The jaws are fully open, so that nothing touches the gel; the reference is the median of frames taken from then on.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from station.devices.camera.interface import Image
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
 from station.messages import grip as messages
 from station.messages.message import Message
+from station.press.rig import Frame, GripError, Position, Rig, Step
 from station.settings.service import ReferenceSettings
-from station.vision.contact import Method
+from station.vision.contact import Image, Method
 from station.vision.image_quality import DEAD_LED, light, sharpness
+from station.vision.methods import median_image
 from station.vocabulary import Flag
 
 _SATURATED_LEVEL = 250
-
+_OPEN_WITHIN_MM = 2.0
 
 ALARMS = (AlarmId.CAMERA_SATURATED, AlarmId.CAMERA_DIRTY, AlarmId.CAMERA_LED_DEAD, AlarmId.REFERENCE_BAD)
 """Alarms that a refused reference raises."""
+
+
+class JawsNotOpenError(GripError):
+    """The jaws do not open fully: something may touch the gel."""
+
+    def __init__(self, width_mm: float, widest_mm: float) -> None:
+        super().__init__(messages.JAWS_NOT_OPEN(width_mm=width_mm, open_mm=widest_mm))
+        self.width_mm = width_mm
+
+
+def are_open(width_mm: float, widest_mm: float) -> bool:
+    """Whether a measured width is that of the open jaws.
+
+    Args:
+        width_mm: measured.
+        widest_mm: of the open jaws.
+    """
+    return width_mm >= widest_mm - _OPEN_WITHIN_MM
+
+
+async def open_jaws(rig: Rig) -> Position:
+    """Open the jaws fully for a reference.
+
+    Raises:
+        JawsNotOpenError: they do not open, or something stops them.
+    """
+    opened = await rig.open()
+    if opened.blocked or not are_open(opened.width_mm, rig.widest_mm):
+        raise JawsNotOpenError(opened.width_mm, rig.widest_mm)
+    return opened
+
+
+async def take_reference(rig: Rig, number: int) -> Step:
+    """Take frames of the untouched gel away from the nest, with the jaws open, and come back to the nest.
+
+    Args:
+        number: of frames.
+
+    Returns:
+        The frames as a step without contact.
+
+    Raises:
+        JawsNotOpenError: as `open_jaws`.
+        StationError: a fault of the rig.
+    """
+    await rig.make_ready()
+    opened = await open_jaws(rig)
+    await rig.leave_nest()
+    frames = await rig.frames(number)
+    await rig.enter_nest()
+    return Step(-1, opened, frames)
+
+
+def reference_image(frames: Sequence[Frame]) -> Image:
+    """Return the reference: the median of frames of the untouched gel.
+
+    Args:
+        frames: one or more, of one shape.
+    """
+    return median_image([frame.image for frame in frames])
 
 
 class BadReferenceError(StationError):

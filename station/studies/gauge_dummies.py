@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from station.settings.recipe import find_recipe
-from station.studies.gauge_grip import Grip, true_area_mm2
+from station.studies.gauge_grip import FruitRig, Grip, true_area_mm2
 from station.studies.gauge_table import Measurement
 from station.studies.gauge_twin import GaugeTask, Simulated, setup_of
 from station.twin.contact import Pose
@@ -78,7 +78,7 @@ def measure_dummy(task: GaugeTask, parts: int) -> Simulated:
         x_px, y_px = generator.normal(0.0, PLAY_MM / MM_PER_PX, 2)
         closing_mm = stop_mm(task.fruit) + float(generator.normal(0.0, STOP_MM))
         pose = Pose(240.0 + x_px, 320.0 + y_px)
-        contact = Grip(recipe, ball, pose, unit, int(generator.integers(2**31))).held(closing_mm)
+        contact = Grip(recipe, FruitRig(ball, pose, unit, int(generator.integers(2**31)))).held(closing_mm)
         if not contact.flags or refused == _MOST_READINGS - 1:
             break
         refused += 1

@@ -1,27 +1,36 @@
-"""One grip of the twin's as the station does it: what lies between gel and sponge, seen and measured frame by frame."""
+"""One press on the twin by the station's own procedure: what lies between gel and sponge, imaged and measured."""
 
-from collections.abc import Iterator, Sequence
+import asyncio
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
-from station.inspection.judge import early_stop
-from station.inspection.press import Measured, Press
+from station.inspection.press import Press
+from station.messages.message import Message
+from station.press.measurement import PressMeasurement, measured_point
+from station.press.procedure import close_in_steps, onset_from, take_step
+from station.press.reference import take_reference
+from station.press.rig import MeasuredStep, Position, Step
+from station.press.stop import NothingTouchedError, ends_steps
 from station.settings.gripper import GripperCalibration
 from station.settings.recipe_model import Recipe
+from station.studies.simulated_rig import SimulatedFrame, StandingRig
 from station.twin.contact import FruitOnGel, Pose
 from station.twin.digit.sensor import DigitSensor
 from station.twin.fruit import Fruit
 from station.twin.gel import MM_PER_PX, Gel
 from station.twin.squeeze import Squeeze
-from station.vision.contact import Contact, Image
+from station.vision.contact import Contact
 from station.vision.methods import make_method
-from station.vision.press import PressTracker
-from station.vision.step import measure_step
 
 _FRAME_S, _STEP_S = 1 / 30, 0.5
 _APPROACH_MM = 2.0
 _MOST_COUNTS = 40
 _HELD_S = 2.0
+_OPEN_BY_MM = 20.0
+
+GoesOn = Callable[[float, Contact], bool]
+"""Gets a step's closing, mm, and its contact; says whether another step is to be made."""
 
 
 def deciding_closing_mm(recipe: Recipe) -> float:
@@ -64,12 +73,11 @@ class Onset(NamedTuple):
     contact: Contact
 
 
-class Grip:
-    """One fruit between gel and sponge.
+class FruitRig(StandingRig):
+    """A press rig with one fruit between gel and sponge. Its widths are the true ones.
 
     Args:
-        recipe: how many frames, and how they are measured; how to step, in a press.
-        fruit: what is gripped.
+        fruit: what is pressed.
         pose: how it lies.
         unit: seed of the sensor's light; None for the unit that the optics were fitted on.
         noise_seed: of the sensor's noise and drift.
@@ -77,23 +85,72 @@ class Grip:
     """
 
     def __init__(
-        self,
-        recipe: Recipe,
-        fruit: Fruit,
-        pose: Pose,
-        unit: int | None,
-        noise_seed: int,
-        mm_per_px: float = MM_PER_PX,
+        self, fruit: Fruit, pose: Pose, unit: int | None, noise_seed: int, mm_per_px: float = MM_PER_PX
     ) -> None:
-        self._recipe, self._fruit = recipe, fruit
-        self._count_mm = GripperCalibration().mm_per_count
+        self.fruit = fruit
+        self.finest_step_mm = GripperCalibration().mm_per_count
+        self.widest_mm = self.counts_from_mm = fruit.width_mm + _OPEN_BY_MM
+        """The fingers reach only widths that are whole counts of the gripper from `counts_from_mm`."""
         self._sensor = DigitSensor(noise_seed, unit, mm_per_px=mm_per_px)
         self._gel = Gel(mm_per_px=mm_per_px)
         self._contact = FruitOnGel(fruit, pose, self._gel)
-        self._now_s = 0.0
+        self._width_mm, self._now_s = self.widest_mm, 0.0
         self._touched_s: float | None = None
-        references = self._frames(None, recipe.imaging.reference_frames)
-        self._method = make_method(references, recipe.segmentation)
+
+    async def open(self, width_mm: float | None = None) -> Position:
+        """Open the fingers."""
+        self._width_mm = self.widest_mm if width_mm is None else width_mm
+        return Position(self._width_mm)
+
+    async def close_to(self, width_mm: float) -> Position:
+        """Move to the nearest count of the gripper."""
+        counts = round((self.counts_from_mm - width_mm) / self.finest_step_mm)
+        self._width_mm = self.counts_from_mm - counts * self.finest_step_mm
+        return Position(self._width_mm)
+
+    async def frames(self, number: int) -> tuple[SimulatedFrame, ...]:
+        """Image so often: one frame after the way of a count, several after the time of a step."""
+        if self._width_mm < self.widest_mm:
+            self._now_s += _FRAME_S if number == 1 else _STEP_S
+        return self.images_at(self._width_mm, number)
+
+    def images_at(self, width_mm: float, number: int) -> tuple[SimulatedFrame, ...]:
+        """Image so often at a true width, without any pause before.
+
+        Args:
+            width_mm: any, also between two counts.
+            number: of frames.
+        """
+        closing_mm = self.fruit.width_mm - width_mm
+        dent = None
+        if closing_mm > 0:
+            self._touched_s = self._now_s if self._touched_s is None else self._touched_s
+            squeezed = Squeeze(self.fruit, self._gel, self._now_s - self._touched_s).at(closing_mm)
+            dent = self._contact.pressed(squeezed).dent
+        frames: list[SimulatedFrame] = []
+        for _ in range(number):
+            self._now_s += _FRAME_S
+            frames.append(SimulatedFrame(self._sensor.frame(dent, self._now_s), self._now_s))
+        return tuple(frames)
+
+    async def release(self, failed: Message | None = None) -> None:
+        """Open the fingers."""
+        await self.open()
+
+
+class Grip:
+    """One fruit between gel and sponge, pressed by a recipe.
+
+    Args:
+        recipe: how many frames, and how they are measured; how to step, in a press.
+        rig: with the fruit.
+    """
+
+    def __init__(self, recipe: Recipe, rig: FruitRig) -> None:
+        self._recipe, self._rig = recipe, rig
+        untouched = asyncio.run(take_reference(rig, recipe.imaging.reference_frames))
+        self.method = make_method(untouched.images, recipe.segmentation)
+        self._measurement = PressMeasurement(self.method, recipe.segmentation.robust.least_confidence)
 
     def held(self, closing_mm: float) -> Contact:
         """Measure one step by itself, at a width that something else than the gripper's counts decides.
@@ -101,7 +158,8 @@ class Grip:
         Args:
             closing_mm: the true one.
         """
-        return self._measured_alone(self._fruit.width_mm - closing_mm)
+        width_mm = self._rig.counts_from_mm = self._rig.fruit.width_mm - closing_mm
+        return self._measurement.measure(asyncio.run(take_step(self._rig, self._recipe, 0, width_mm))).contact
 
     def press(self, phase: float, zero_mm: float) -> Pressed:
         """Close to the onset, then step by step.
@@ -114,16 +172,19 @@ class Grip:
         if onset is None:
             untouched = Press(None, 0.0, ())
             return Pressed(untouched, untouched, None)
-        enough_mm = deciding_closing_mm(self._recipe) + self._recipe.steps.step_mm - self._count_mm
+        enough_mm = deciding_closing_mm(self._recipe) + self._recipe.steps.step_mm - self._rig.finest_step_mm
         press = Press(onset.width_mm + zero_mm, onset.uncertainty_mm, ())
         stopped: Press | None = None
-        for closing_mm, contact in self.steps(onset):
-            press = replace(press, points=(*press.points, self._point(closing_mm, contact)))
-            if stopped is None and early_stop(press, self._recipe) is not None:
+
+        def goes_on(closing_mm: float, contact: Contact) -> bool:
+            nonlocal press, stopped
+            press = replace(press, points=(*press.points, measured_point(contact, closing_mm, MM_PER_PX)))
+            if stopped is None and ends_steps(press, self._recipe):
                 stopped = press
-            if stopped is not None and closing_mm > enough_mm:
-                break
-        return Pressed(stopped or press, press, self._fruit.width_mm - onset.width_mm)
+            return stopped is None or closing_mm <= enough_mm
+
+        self.close(onset, goes_on)
+        return Pressed(stopped or press, press, self._rig.fruit.width_mm - onset.width_mm)
 
     def approach(self, phase: float) -> Onset | None:
         """Close count by count to the first contact.
@@ -134,65 +195,34 @@ class Grip:
         Returns:
             The onset; None where nothing was touched.
         """
-        start_mm = self._fruit.width_mm + _APPROACH_MM + phase * self._count_mm
-        for count in range(_MOST_COUNTS):
-            width_mm = start_mm - count * self._count_mm
-            contact = self._touched(width_mm)
-            if contact is not None:
-                return Onset(width_mm, self._count_mm if count else 0.0, contact)
-        return None
+        count_mm = self._rig.finest_step_mm
+        start_mm = self._rig.counts_from_mm = self._rig.fruit.width_mm + _APPROACH_MM + phase * count_mm
 
-    def steps(self, onset: Onset) -> Iterator[tuple[float, Contact]]:
-        """Close step by step by the recipe; each step is pressed and measured when it is asked for.
+        async def measure(step: Step) -> MeasuredStep:
+            return self._measurement.measure(step)
+
+        lowest_mm = start_mm - (_MOST_COUNTS - 0.5) * count_mm
+        try:
+            found = asyncio.run(onset_from(self._rig, self._recipe, start_mm, lowest_mm, measure))
+        except NothingTouchedError:
+            return None
+        width_mm = found.start.step.move.width_mm
+        return Onset(width_mm, count_mm if width_mm < start_mm else 0.0, found.start.contact)
+
+    def close(self, onset: Onset, goes_on: GoesOn) -> None:
+        """Close step by step by the recipe, as one press.
 
         Args:
             onset: where the steps begin.
-
-        Yields:
-            The closing, in whole counts of the gripper, and the contact; first those of the onset.
+            goes_on: gets the closing, in whole counts of the gripper, and the contact; first those of the onset.
         """
-        yield 0.0, onset.contact
-        tracker = PressTracker(self._method, self._recipe.segmentation.robust.least_confidence, first=onset.contact)
-        for step in range(1, self._recipe.steps.number + 1):
-            closing_mm = round(step * self._recipe.steps.step_mm / self._count_mm) * self._count_mm
-            yield closing_mm, tracker.measure_step(self._step_frames(onset.width_mm - closing_mm))
+        count_mm = self._rig.finest_step_mm
+        self._rig.counts_from_mm = onset.width_mm
+        self._measurement.follow(onset.contact)
 
-    def _touched(self, width_mm: float) -> Contact | None:
-        """One frame; where it shows a contact, a full step at the same width has to confirm it."""
-        self._now_s += _FRAME_S
-        if not self._method.measure(self._frames(width_mm, 1)[0]).is_firm:
-            return None
-        contact = self._measured_alone(width_mm)
-        return contact if contact.is_firm else None
+        async def measured(step: Step) -> bool:
+            counts = round((onset.width_mm - step.move.width_mm) / count_mm)
+            return goes_on(counts * count_mm, self._measurement.measure(step).contact)
 
-    def _measured_alone(self, width_mm: float) -> Contact:
-        frames = self._step_frames(width_mm)
-        return measure_step(self._method, frames, self._recipe.segmentation.robust.least_confidence)
-
-    def _step_frames(self, width_mm: float) -> Sequence[Image]:
-        self._now_s += _STEP_S
-        return self._frames(width_mm, self._recipe.imaging.frames_per_step)
-
-    def _frames(self, width_mm: float | None, number: int) -> Sequence[Image]:
-        """So many frames at a true width; None for nothing between the fingers."""
-        closing_mm = -1.0 if width_mm is None else self._fruit.width_mm - width_mm
-        dent = None
-        if closing_mm > 0:
-            self._touched_s = self._now_s if self._touched_s is None else self._touched_s
-            squeezed = Squeeze(self._fruit, self._gel, self._now_s - self._touched_s).at(closing_mm)
-            dent = self._contact.pressed(squeezed).dent
-        frames = []
-        for _ in range(number):
-            self._now_s += _FRAME_S
-            frames.append(self._sensor.frame(dent, self._now_s))
-        return frames
-
-    def _point(self, closing_mm: float, contact: Contact) -> Measured:
-        area_mm2 = contact.area_px * MM_PER_PX**2
-        return Measured(
-            closing_mm=closing_mm,
-            area_mm2=area_mm2,
-            area_px=contact.area_px,
-            confidence=contact.confidence,
-            flags=contact.flags,
-        )
+        if goes_on(0.0, onset.contact):
+            asyncio.run(close_in_steps(self._rig, self._recipe, onset.width_mm, measured))

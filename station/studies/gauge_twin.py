@@ -14,7 +14,7 @@ import numpy as np
 from station.inspection.judge import judge
 from station.settings.recipe import find_recipe
 from station.studies.cohort import member
-from station.studies.gauge_grip import Grip, deciding_closing_mm, true_area_mm2
+from station.studies.gauge_grip import FruitRig, Grip, deciding_closing_mm, true_area_mm2
 from station.studies.gauge_table import Measurement
 from station.twin.contact import Pose
 from station.twin.fruit import Fruit
@@ -112,7 +112,7 @@ def measure_part(task: GaugeTask) -> Simulated:
     recipe = find_recipe(task.fruit)
     fruit, setup, pose = part_of(task), setup_of(task), pose_of(task)
     generator = np.random.default_rng([task.seed, 103, task.part, task.operator, task.repeat])
-    grip = Grip(recipe, fruit, pose, setup.unit, int(generator.integers(2**31)))
+    grip = Grip(recipe, FruitRig(fruit, pose, setup.unit, int(generator.integers(2**31))))
     pressed = grip.press(float(generator.uniform(0.0, 1.0)), setup.zero_mm)
     deciding_mm = deciding_closing_mm(recipe)
     areas = judge(pressed.on_to_the_threshold, recipe).areas

@@ -1,10 +1,12 @@
 """Simulated calibration rig: a ball between the twin's gel and sponge, without gripper and wire, for many repeats."""
 
-from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from station.calibration.rig import Place, Pressed
+from station.calibration.rig import Place
+from station.messages.message import Message
+from station.press.rig import Position
 from station.twin.contact import FruitOnGel, Pose
 from station.twin.digit.sensor import Condition, DigitSensor, Image
 from station.twin.fruit import Kind, draw_fruit
@@ -14,10 +16,34 @@ from station.twin.squeeze import Squeeze
 _HOLDER_MM = 18.0
 _FRAME_S, _STEP_S = 1 / 30, 1.3
 _COUNT_MM = 85 / 227
-_OPEN_MM, _CLOSED_COUNT, _FINGERS_MM = 53.0, 230, 32.0
+_CLOSED_COUNT, _FINGERS_MM = 230, 32.0
 
 
-class SimulatedRig:
+class SimulatedFrame(NamedTuple):
+    """One frame of the twin's sensor."""
+
+    image: Image
+    captured_s: float
+    sequence: int = 0
+
+
+class StandingRig:
+    """The verbs that do nothing on a rig without an arm, whose moves take their time at once."""
+
+    async def make_ready(self) -> None:
+        """Do nothing: it always is."""
+
+    async def leave_nest(self) -> None:
+        """Do nothing: there is no arm."""
+
+    async def enter_nest(self) -> None:
+        """Do nothing: there is no arm."""
+
+    async def settle(self) -> None:
+        """Do nothing: the time has passed."""
+
+
+class SimulatedRig(StandingRig):
     """A rig whose widths are whole counts of the gripper, and whose light drifts from step to step.
 
     Args:
@@ -28,8 +54,11 @@ class SimulatedRig:
         condition: fault of the sensor.
         holder_mm: thickness of the ball's holder; it shifts the contact onset.
         spill_mm: standard deviation of the ball's place.
-        frames_per_step: as the recipe's.
+        frames_per_step: at most so many frames of a step, for runs with many repeats.
     """
+
+    widest_mm = 53.0
+    finest_step_mm = 0.4
 
     def __init__(
         self,
@@ -49,23 +78,34 @@ class SimulatedRig:
         self.condition = condition or Condition()
         self._spill, self._spill_mm = np.random.default_rng([seed, 9]), spill_mm
         self._frames_per_step = frames_per_step
-        self._now_s, self._width_mm = 0.0, _OPEN_MM
+        self._now_s, self._width_mm = 0.0, self.widest_mm
         self.released = 0
         self.places: list[Place] = []
         self._contact = FruitOnGel(self._fruit, Pose(), self._gel)
 
-    async def untouched(self, number: int) -> Sequence[Image]:
-        """Return frames with the jaws open; an object too wide for the open jaws still touches."""
-        self._width_mm = _OPEN_MM
+    async def open(self, width_mm: float | None = None) -> Position:
+        """Open the jaws; an object too wide for the open jaws still touches."""
+        self._width_mm = self.widest_mm if width_mm is None else width_mm
         self._now_s += _STEP_S
-        return self._frames(number)
+        return Position(self._width_mm)
 
-    async def press_to(self, width_mm: float) -> Pressed:
-        """Return a step's frames."""
+    async def close_to(self, width_mm: float) -> Position:
+        """Move to the nearest count of the gripper; the time of a whole step passes."""
         count = round(_CLOSED_COUNT - (width_mm + _FINGERS_MM) / _COUNT_MM)
         self._width_mm = (_CLOSED_COUNT - count) * _COUNT_MM - _FINGERS_MM
         self._now_s += _STEP_S
-        return Pressed(self._width_mm, self._frames(self._frames_per_step))
+        return Position(self._width_mm)
+
+    async def frames(self, number: int) -> tuple[SimulatedFrame, ...]:
+        """Return frames, of a step at most so many as this rig was made for."""
+        is_open = self._width_mm >= self.widest_mm
+        squeezed = Squeeze(self._fruit, self._gel, held_s=_STEP_S).at(self.closing_mm)
+        dent = self._contact.pressed(squeezed).dent if squeezed.closing_mm > 0 else None
+        frames: list[SimulatedFrame] = []
+        for _ in range(number if is_open else min(number, self._frames_per_step)):
+            frames.append(SimulatedFrame(self._sensor.frame(dent, self._now_s, self.condition), self._now_s))
+            self._now_s += _FRAME_S
+        return tuple(frames)
 
     async def lay(self, place: Place) -> None:
         """Lay the ball at a place, with the place's deviation."""
@@ -74,10 +114,10 @@ class SimulatedRig:
         scale = self._gel.mm_per_px
         self._contact = FruitOnGel(self._fruit, Pose(240 + x_mm / scale, 320 + y_mm / scale), self._gel)
 
-    async def release(self) -> None:
+    async def release(self, failed: Message | None = None) -> None:
         """Open the jaws."""
         self.released += 1
-        self._width_mm = _OPEN_MM
+        self._width_mm = self.widest_mm
 
     @property
     def closing_mm(self) -> float:
@@ -88,12 +128,3 @@ class SimulatedRig:
         """Return the area inside the visible edge at a width."""
         closing_mm = self._fruit.width_mm + self._holder_mm - width_mm
         return self._contact.pressed(Squeeze(self._fruit, self._gel).at(closing_mm)).true_area_px
-
-    def _frames(self, number: int) -> list[Image]:
-        squeezed = Squeeze(self._fruit, self._gel, held_s=_STEP_S).at(self.closing_mm)
-        dent = self._contact.pressed(squeezed).dent if squeezed.closing_mm > 0 else None
-        frames = []
-        for _ in range(number):
-            frames.append(self._sensor.frame(dent, self._now_s, self.condition))
-            self._now_s += _FRAME_S
-        return frames

@@ -16,6 +16,7 @@ from station.calibration.model import PlacePoint, Refusal
 from station.calibration.report import refusal_files
 from station.calibration.rig import Unit
 from station.errors import BadInputError
+from station.press.reference import take_reference
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import find_recipe
 from station.settings.segmentation import Segmentation
@@ -114,9 +115,9 @@ def test_a_refusal_keeps_every_picture_and_check_and_is_never_used(drawn_ball, s
 
 def test_an_area_that_falls_is_refused(drawn_ball, calibrate_drawn):
     class Slipping(drawn_ball):
-        async def press_to(self, width_mm):
+        async def close_to(self, width_mm):
             return replace(
-                await super().press_to(width_mm + (3.0 if abs(width_mm - 38) < 0.5 else 0.0)), width_mm=width_mm
+                await super().close_to(width_mm + (3.0 if abs(width_mm - 38) < 0.5 else 0.0)), width_mm=width_mm
             )
 
     with pytest.raises(RefusedError, match=r"rising: from 39\.0 to 38\.0 mm the area goes from"):
@@ -173,7 +174,7 @@ def test_the_scale_does_not_mind_how_the_axes_lie_and_doubts_places_that_disagre
 
 
 def test_a_noisy_unit_gets_a_higher_gate_and_a_quiet_one_keeps_the_recipes(drawn_ball):
-    frames = asyncio.run(drawn_ball(1).untouched(4))
+    frames = asyncio.run(take_reference(drawn_ball(1), 4)).images
     empty = Contact(np.zeros((2, 2), np.uint8), 0, None, frozenset(), gate=1.0, drift_levels=2.0)
     found = noise(frames, [empty])
     assert found.gate_factor == pytest.approx(1.25)

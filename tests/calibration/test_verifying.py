@@ -10,6 +10,7 @@ import pytest
 from station.calibration.gel import GelFault, examine
 from station.calibration.report import verification_files
 from station.calibration.verification_procedure import VerificationProcedure
+from station.press.reference import take_reference
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import find_recipe
 from station.twin.digit.sensor import Condition
@@ -100,11 +101,11 @@ def test_real_sensors_without_contact_are_not_called_torn_or_dirty(real_images):
 
 def test_a_mark_shows_where_the_dirt_lies(drawn_ball):
     ball = drawn_ball(1)
-    golden = median_image(asyncio.run(ball.untouched(5)))
+    golden = median_image(asyncio.run(take_reference(ball, 5)).images)
     ball.condition = Condition(dirt=1)
-    [finding] = examine(median_image(asyncio.run(ball.untouched(5))), golden, 0.75)
+    [finding] = examine(median_image(asyncio.run(take_reference(ball, 5)).images), golden, 0.75)
     marked = (finding.picture == (0, 0, 255)).all(axis=2)
-    now = median_image(asyncio.run(ball.untouched(5))).astype(float)
+    now = median_image(asyncio.run(take_reference(ball, 5)).images).astype(float)
     crumb = np.abs(now - golden).max(axis=2) > 25
     rows, columns = np.nonzero(marked)
     inside = crumb[rows.min() : rows.max(), columns.min() : columns.max()]

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from station.messages.message import verbatim
-from station.press.procedure import FramesError, at_once
+from station.runtime.devices.rig import FramesError, at_once
 
 
 def test_where_one_fails_the_others_are_cancelled_and_its_own_error_is_raised():

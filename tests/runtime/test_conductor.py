@@ -11,9 +11,9 @@ from station.errors import StationError
 from station.inspection.cycle import Action, Event
 from station.inspection.states import State
 from station.messages.message import verbatim
-from station.press.procedure import FramesError
 from station.records.errors import DiskFullError
 from station.runtime.cycle.runner import CycleRunner, event_of
+from station.runtime.devices.rig import FramesError
 
 
 @pytest.mark.parametrize(

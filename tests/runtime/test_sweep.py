@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -11,8 +12,12 @@ from station.devices.camera.interface import Frame
 from station.devices.gripper.errors import GripperStoppedError
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
 from station.messages import gripper as gripper_messages
-from station.press import procedure as grip_module
-from station.press.procedure import MOST_UNSEEN_MM, Cell, Grip, NothingTouchedError, UnseenContactError
+from station.press import motion
+from station.press.motion import close_on, sweep
+from station.press.procedure import onset
+from station.press.stop import MOST_UNSEEN_MM, NothingTouchedError, UnseenContactError
+from station.runtime.devices import rig as rig_module
+from station.runtime.devices.rig import Cell, DeviceRig
 from station.settings.recipe import find_recipe
 
 BLUEBERRY = find_recipe("blueberry")
@@ -80,7 +85,7 @@ class Fingers:
 
 @pytest.fixture
 def cell(monkeypatch):
-    def make(fruit_mm: float, stopped_at_mm: float = 0.0) -> tuple[Fingers, Grip, Any]:
+    def make(fruit_mm: float, stopped_at_mm: float = 0.0) -> tuple[Fingers, DeviceRig, Any]:
         fingers = Fingers(fruit_mm, stopped_at_mm)
 
         class Clock:
@@ -88,49 +93,52 @@ def cell(monkeypatch):
             def monotonic() -> float:
                 return fingers.now_s
 
-        monkeypatch.setattr(grip_module, "time", Clock)
+        monkeypatch.setattr(motion, "time", Clock)
+        monkeypatch.setattr(rig_module, "time", Clock)
 
-        async def touches(step: Any) -> bool:
-            return fingers.width_at(step.last_frame.captured_s) < fruit_mm
+        async def measure(step: Any) -> Any:
+            touched = fingers.width_at(step.last_frame.captured_s) < fruit_mm
+            return SimpleNamespace(step=step, contact=SimpleNamespace(is_firm=touched))
 
-        return fingers, Grip(Cell(cast("Any", fingers), cast("Any", fingers), None), BLUEBERRY), touches
+        return fingers, DeviceRig(Cell(cast("Any", fingers), cast("Any", fingers), None), BLUEBERRY), measure
 
     return make
 
 
 def test_the_fingers_close_on_until_a_frame_shows_a_contact_and_each_frame_has_its_own_width(cell):
     async def scenario():
-        fingers, grip, touches = cell(15.3)
-        met = await grip.sweep(touches)
+        fingers, rig, measure = cell(15.3)
+        met = await sweep(rig, BLUEBERRY, measure)
         stopped_mm = (await fingers.read()).width_mm
         assert fingers.stops == 1
         assert met.clear_mm is not None
         assert met.width_mm < 15.3 <= met.clear_mm
         assert met.clear_mm - met.width_mm == pytest.approx(BLUEBERRY.gripper.speed_mm_s * FRAME_S, abs=0.01)
         assert 15.3 - stopped_mm < MOST_UNSEEN_MM
-        before, start = await grip.onset(met, touches)
+        before, start = await onset(rig, BLUEBERRY, met, measure)
         assert min(fingers.opened_to_mm) > 15.3, "the fine search begins where nothing touches"
         assert before is not None
-        assert before.move.width_mm >= 15.3 > start.move.width_mm
-        assert before.move.width_mm - start.move.width_mm == pytest.approx(0.4)
+        assert before.move.width_mm >= 15.3 > start.step.move.width_mm
+        assert before.move.width_mm - start.step.move.width_mm == pytest.approx(0.4)
 
     asyncio.run(scenario())
 
 
 def test_fingers_wait_for_a_measurement_that_is_late(cell, monkeypatch):
     async def scenario():
-        fingers, grip, touches = cell(15.3)
-        monkeypatch.setattr(grip_module, "time", time)
+        fingers, rig, measure = cell(15.3)
+        monkeypatch.setattr(motion, "time", time)
+        monkeypatch.setattr(rig_module, "time", time)
         fingers.now_s = time.monotonic()
         pending = []
 
-        async def late(step: Any) -> bool:
+        async def late(step: Any) -> Any:
             pending.append(step)
             while len(pending) == 3 and not fingers.stops:
                 await asyncio.sleep(0.01)
-            return await touches(step)
+            return await measure(step)
 
-        met = await grip.sweep(late)
+        met = await sweep(rig, BLUEBERRY, late)
         assert fingers.stops == 2, "once for the late one, once at the contact"
         assert met.width_mm < 15.3
 
@@ -140,16 +148,16 @@ def test_fingers_wait_for_a_measurement_that_is_late(cell, monkeypatch):
 @pytest.mark.parametrize(("stopped_at_mm", "error"), [(14.0, UnseenContactError), (0.0, NothingTouchedError)])
 def test_fingers_that_end_their_way_without_a_contact_say_whether_something_held_them(cell, stopped_at_mm, error):
     async def scenario():
-        _, grip, touches = cell(0.0, stopped_at_mm)
+        _, rig, measure = cell(0.0, stopped_at_mm)
         with pytest.raises(error):
-            await grip.sweep(touches)
+            await sweep(rig, BLUEBERRY, measure)
 
     asyncio.run(scenario())
 
 
 def test_frames_on_the_way_wait_for_a_measurement_that_is_late(cell):
     async def scenario():
-        fingers, grip, _ = cell(15.3)
+        fingers, rig, _ = cell(15.3)
         await fingers.open(16.0)
         widths_mm = []
 
@@ -160,7 +168,7 @@ def test_frames_on_the_way_wait_for_a_measurement_that_is_late(cell):
             return True
 
         async with asyncio.timeout(10):
-            assert (await grip.close_on(13.0, measured)).width_mm == 13.0
+            assert (await close_on(rig, BLUEBERRY, 13.0, measured)).width_mm == 13.0
         way_mm = BLUEBERRY.gripper.speed_mm_s * FRAME_S
         assert -np.diff(widths_mm) == pytest.approx([way_mm] * 3, abs=0.01), "every frame, each with its own width"
 
@@ -169,9 +177,9 @@ def test_frames_on_the_way_wait_for_a_measurement_that_is_late(cell):
 
 def test_an_area_that_ends_the_steps_stops_the_fingers_on_their_way(cell):
     async def scenario():
-        fingers, grip, _ = cell(15.3)
+        fingers, rig, _ = cell(15.3)
         await fingers.open(16.0)
-        stopped = await grip.close_on(10.0, lambda step: asyncio.sleep(0, step.move.width_mm > 14.5))
+        stopped = await close_on(rig, BLUEBERRY, 10.0, lambda step: asyncio.sleep(0, step.move.width_mm > 14.5))
         assert fingers.stops == 1
         assert 10.0 < stopped.width_mm < 14.5
 
@@ -181,7 +189,7 @@ def test_an_area_that_ends_the_steps_stops_the_fingers_on_their_way(cell):
 @pytest.mark.parametrize(("answers_in_s", "known"), [(0.02, True), (0.06, False)])
 def test_a_frame_whose_width_is_not_known_to_a_count_is_no_step(cell, answers_in_s, known):
     async def scenario():
-        fingers, grip, _ = cell(15.3)
+        fingers, rig, _ = cell(15.3)
         fingers.answers_in_s = answers_in_s
         await fingers.open(16.0)
         steps = []
@@ -190,7 +198,7 @@ def test_a_frame_whose_width_is_not_known_to_a_count_is_no_step(cell, answers_in
             steps.append(step)
             return True
 
-        await grip.close_on(10.0, measured)
+        await close_on(rig, BLUEBERRY, 10.0, measured)
         assert bool(steps) == known
         for step in steps:
             assert step.move.width_mm == pytest.approx(fingers.width_at(step.last_frame.captured_s), abs=0.4)

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from station.devices.camera.interface import Frame
-from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
-from station.press.procedure import GripStep
+from station.press.rig import Position, Step
 from station.runtime.imaging import worker as module
 from station.runtime.imaging.golden_reference import GoldenReference
 from station.runtime.imaging.worker import VisionWorker
@@ -31,12 +30,8 @@ def frame(seed: int, pressed: float = 0.0) -> Frame:
     return Frame(np.clip(slopes + noise, 0, 255).astype(np.uint8), seed, float(seed))
 
 
-def reading(width_mm: float) -> GripperReading:
-    return GripperReading(width_mm, 0, 0, ObjectState.AT_POSITION, active=True, fault_code=0, current_a=None, at_s=0.0)
-
-
-def step_of(frames: list[Frame]) -> GripStep:
-    return GripStep(1, MoveResult(18.0, 0, reading(18.0)), tuple(frames))
+def step_of(frames: list[Frame]) -> Step:
+    return Step(1, Position(18.0), tuple(frames))
 
 
 @pytest.fixture

@@ -113,11 +113,12 @@ class TwinCamera:
             reason = str(answer.get("message"))
             raise CameraError(messages.TWIN_LIGHT_REFUSED(address=self._where, reason=reason))
 
-    async def true_mask(self, frame: Frame) -> Mask:
+    async def true_mask(self, sequence: int, shape: tuple[int, ...]) -> Mask:
         """Return the true contact mask of a frame, which only a twin has; never used for a measurement.
 
         Args:
-            frame: one of the last frames of this camera.
+            sequence: of one of the last frames of this camera.
+            shape: of its image.
 
         Returns:
             Shape (height, width), dtype uint8, 0 or 255.
@@ -127,13 +128,10 @@ class TwinCamera:
         """
         try:
             async with asyncio.timeout(_SILENCE_S):
-                reader, writer = await self._ask({"kind": "truth", "sequence": frame.sequence})
+                reader, writer = await self._ask({"kind": "truth", "sequence": sequence})
                 try:
                     answer = await _read_header(reader)
-                    if (
-                        answer.get("kind") != "truth"
-                        or answer.get("bytes") != frame.image.shape[0] * frame.image.shape[1]
-                    ):
+                    if answer.get("kind") != "truth" or answer.get("bytes") != shape[0] * shape[1]:
                         reason = str(answer.get("message"))
                         raise CameraError(messages.TWIN_NO_TRUTH(address=self._where, reason=reason))
                     pixels = await reader.readexactly(answer["bytes"])
@@ -141,7 +139,7 @@ class TwinCamera:
                     await _close(writer)
         except (OSError, EOFError, TimeoutError) as error:
             raise CameraError(messages.TWIN_TRUTH_NOT_READ(address=self._where, reason=_describe(error))) from error
-        return np.frombuffer(pixels, np.uint8).reshape(frame.image.shape[:2])
+        return np.frombuffer(pixels, np.uint8).reshape(shape[:2])
 
     async def close(self) -> None:
         """Disconnect. Idempotent."""

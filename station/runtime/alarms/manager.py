@@ -19,12 +19,12 @@ from station.inspection.alarm_table import ALARMS, AlarmId
 from station.inspection.alarms import CAUSED, Alarms
 from station.messages import alarm_commands as messages
 from station.messages.message import Message, message_in, message_of, text_of
-from station.press.procedure import FramesError
 from station.records.errors import RecordsError
 from station.records.model import AlarmEntry, AlarmRow
 from station.records.records import Records
 from station.runtime.cycle.inspection import utc_ms
 from station.runtime.devices.manager import ARM, CAMERA, GRIPPER
+from station.runtime.devices.rig import FramesError
 from station.runtime.observability.metrics import Metrics
 
 log = logging.getLogger(__name__)

@@ -9,34 +9,27 @@ from station.calibration.gate import gated
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import Frame
 from station.devices.gripper.errors import GripperLinkLostError, GripperSilentError, GripperTimeoutError
-from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
 from station.inspection.alarm_table import AlarmId
 from station.inspection.centring import NOT_MOVED, Way, off_middle, too_far
 from station.inspection.cycle import REASONS, Event
-from station.inspection.evidence import AT_MM
-from station.inspection.judge import early_stop, judge
+from station.inspection.judge import judge
 from station.inspection.second_press import FREED_BY_MM, needs_second_press
 from station.messages import operation as messages
 from station.messages.message import Message, message_of
-from station.press.procedure import (
-    FRAME_DEADLINE_S,
-    Grip,
-    GripStep,
-    NothingTouchedError,
-    UnseenContactError,
-    at_once,
-)
-from station.press.reference import ALARMS, BadReferenceError
+from station.press import stop
+from station.press.motion import close_on, sweep
+from station.press.procedure import onset, take_step
+from station.press.reference import ALARMS, BadReferenceError, JawsNotOpenError, open_jaws
+from station.press.rig import MeasuredStep, Position, Step
 from station.records.model import Image
 from station.runtime.alarms.manager import AlarmManager
 from station.runtime.cycle.inspection import Inspection
 from station.runtime.devices.manager import CAMERA, GRIPPER, DeviceManager
-from station.runtime.imaging.worker import MeasuredStep, VisionWorker
+from station.runtime.devices.rig import FRAME_DEADLINE_S, DeviceRig, at_once
+from station.runtime.imaging.worker import VisionWorker
 from station.runtime.observability.metrics import Metrics
 from station.settings.configuration import Configuration
 from station.vocabulary import Reason
-
-_OPEN_WITHIN_MM = 2.0
 
 log = logging.getLogger(__name__)
 
@@ -61,8 +54,7 @@ class Inspector:
         self._devices, self._vision = devices, vision
         self._settings, self._arm = configuration.service, configuration.arm
         self._alarms, self._metrics = alarms, metrics
-        self._reached: MoveResult | None = None
-        self._glanced: MeasuredStep | None = None
+        self._reached: Position | None = None
         self._goes_on = asyncio.Event()
         """Set when a measured step lets another one be made."""
 
@@ -97,14 +89,10 @@ class Inspector:
 
     async def check_jaws(self, now: Inspection) -> Event:
         """Make sure that the jaws are open before a reference is taken: else something may be held against the gel."""
-        gripper = self._devices.cell.gripper
-        opened = await gripper.open()
-        touched = opened.reading.object_state in {ObjectState.CONTACT_OPENING, ObjectState.CONTACT_CLOSING}
-        if touched or opened.width_mm < gripper.max_width_mm - _OPEN_WITHIN_MM:
-            now.interrupt(
-                Reason.REFERENCE_BAD,
-                messages.JAWS_NOT_OPEN(width_mm=opened.width_mm),
-            )
+        try:
+            await open_jaws(self._rig(now))
+        except JawsNotOpenError as error:
+            now.interrupt(Reason.REFERENCE_BAD, messages.JAWS_NOT_OPEN(width_mm=error.width_mm))
             return Event.REFERENCE_BAD
         self._devices.monitors[GRIPPER].report_success()
         return Event.JAWS_OPEN
@@ -117,7 +105,7 @@ class Inspector:
             good.append(await self._examined(now))
 
         jaws = self._devices.cell.gripper.open(self._width_around(now))
-        await at_once(self._grip(now).go("above_nest", "nest"), jaws, examined())
+        await at_once(self._rig(now).go("above_nest", "nest"), jaws, examined())
         return Event.ARRIVED if all(good) else Event.REFERENCE_BAD
 
     def _width_around(self, now: Inspection) -> float:
@@ -130,7 +118,7 @@ class Inspector:
 
     async def _examined(self, now: Inspection) -> bool:
         """Take the reference's frames, while nothing touches the gel, and examine them."""
-        frames = await self._grip(now, self._count).sound_frames(now.active.recipe.imaging.reference_frames)
+        frames = await self._rig(now, self._count).frames(now.active.recipe.imaging.reference_frames)
         self._devices.monitors[CAMERA].report_success()
         now.reference_s = frames[-1].captured_s
         return await self._examine(now, frames)
@@ -161,42 +149,40 @@ class Inspector:
 
     async def close_to_onset(self, now: Inspection) -> Event:
         """Close until the gel is touched, or to the recipe's start width; that image is the curve's first."""
-        self._reached = self._glanced = None
+        self._reached = None
         await self._vision.begin_press()
-        grip, plan = self._grip(now), now.active.recipe.steps
+        rig, recipe, plan = self._rig(now), now.active.recipe, now.active.recipe.steps
         try:
             if plan.start_width_mm is not None:
-                start = await grip.step(0, plan.start_width_mm)
+                first = await self._vision.measure(await take_step(rig, recipe, 0, plan.start_width_mm))
             else:
-                met = await grip.sweep(self._touches)
-                stopped = await self._devices.cell.gripper.read()
+                met = await sweep(rig, recipe, self._seen)
+                stopped = await rig.read()
                 now.measures["overshoot_mm"] = round(met.width_mm - stopped.width_mm, 2)
-                if now.closings == 0 and self._sets_out(now, await self._first_contact(now, grip, stopped)):
+                if now.closings == 0 and self._sets_out(now, await self._first_contact(now, rig, stopped)):
                     now.closings = 1
                     now.let_go(met.width_mm)
                     return Event.OFF_MIDDLE
-                before, start = await grip.onset(met, self._touches)
+                before, first = await onset(rig, recipe, met, self._seen)
                 now.before_onset_mm = None if before is None else before.move.width_mm
-        except (NothingTouchedError, UnseenContactError) as error:
+        except (stop.NothingTouchedError, stop.UnseenContactError) as error:
             now.interrupt(Reason.NO_CONTACT, message_of(error))
             return Event.NO_ONSET
-        now.steps.append(start)
-        known = self._glanced is not None and self._glanced.step is start
-        now.seen.append(self._glanced if known and self._glanced else await self._vision.measure(start))
+        now.steps.append(first.step)
+        now.seen.append(first)
         now.closings += 1
         off = self._off_middle(now, now.seen[-1])
         if plan.start_width_mm is not None and now.closings == 1 and self._sets_out(now, off):
-            now.let_go(start.move.width_mm)
+            now.let_go(first.step.move.width_mm)
             return Event.OFF_MIDDLE
         if now.moved != NOT_MOVED and off is not None:
             now.measures["left_off_mm"] = round(off.length_mm, 2)
         await self._vision.follow(now.seen[-1].contact)
         return Event.ONSET_FOUND
 
-    async def _first_contact(self, now: Inspection, grip: Grip, at: GripperReading) -> Way | None:
+    async def _first_contact(self, now: Inspection, rig: DeviceRig, at: Position) -> Way | None:
         """How far a contact is off the field's middle where the fingers came to rest; None where there is none."""
-        step = GripStep(-1, MoveResult(at.width_mm, at.echoed_count, at), await grip.sound_frames(1))
-        return self._off_middle(now, await self._vision.measure(step))
+        return self._off_middle(now, await self._vision.measure(Step(-1, at, await rig.frames(1))))
 
     @staticmethod
     def _off_middle(now: Inspection, seen: MeasuredStep) -> Way | None:
@@ -253,7 +239,7 @@ class Inspector:
         if self._closes_on(now):
             await self._close_on(now)
         else:
-            self._reached = await self._grip(now).close_to(now.next_width_mm)
+            self._reached = await self._rig(now).close_to(now.next_width_mm)
             now.closed_steps += 1
         return Event.REACHED
 
@@ -269,24 +255,22 @@ class Inspector:
         """
         now.closed_steps = now.steps_to_decide
 
-        async def goes_on(step: GripStep) -> bool:
+        async def goes_on(step: Step) -> bool:
             now.steps.append(replace(step, number=len(now.steps)))
             now.seen.append(await self._vision.measure(now.steps[-1]))
-            if early_stop(now.press(), now.active.recipe) is None:
+            if not stop.ends_steps(now.press(), now.active.recipe):
                 return True
             now.closed_steps = now.active.recipe.steps.number  # no step after this image
             return False
 
         # The frames are measured one by one: none is measured ahead, since each follows the one before.
-        self._reached = await self._grip(now, self._count).close_on(now.deciding_width_mm, goes_on)
+        self._reached = await close_on(self._rig(now, self._count), now.active.recipe, now.deciding_width_mm, goes_on)
 
     @staticmethod
     def _may_decide(now: Inspection) -> bool:
         """Whether the last captured step may decide, by a recipe that stops when decided."""
-        recipe, onset_mm = now.active.recipe, now.onset_mm
-        if not recipe.steps.stop_when_decided or onset_mm is None:
-            return False
-        return onset_mm - now.steps[-1].move.width_mm >= recipe.damage.deciding_closing_mm - AT_MM
+        closing_mm = None if now.onset_mm is None else now.onset_mm - now.steps[-1].move.width_mm
+        return stop.may_decide(now.active.recipe, closing_mm)
 
     async def settle(self, now: Inspection) -> Event:
         """Let fruit and gel come to rest: every step waits as long, because fruit creeps.
@@ -302,19 +286,17 @@ class Inspector:
         recipe, reached = now.active.recipe, self._reached
         if reached is None:
             raise RuntimeError("a step is captured that was not reached")
-        frames = await self._grip(now).sound_frames(recipe.imaging.frames_per_step)
+        frames = await self._rig(now).frames(recipe.imaging.frames_per_step)
         self._devices.monitors[CAMERA].report_success()
         self._devices.monitors[GRIPPER].report_success()
-        now.steps.append(GripStep(len(now.steps), reached, frames))
-        held = reached.reading.object_state is ObjectState.CONTACT_CLOSING  # at the force limit: it closes no further
-        if now.closed_steps >= recipe.steps.number or held or now.next_width_mm <= 0:
-            return Event.LAST_CAPTURED
-        return Event.CAPTURED
+        now.steps.append(Step(len(now.steps), reached, frames))
+        last = stop.is_last_step(recipe, now.closed_steps, now.next_width_mm, reached)
+        return Event.LAST_CAPTURED if last else Event.CAPTURED
 
     async def measure(self, now: Inspection) -> Event:
         """Measure the captured step that is next in order, and say whether the recipe lets another one be made."""
         now.seen.append(await self._vision.measure(now.steps[len(now.seen)]))
-        if early_stop(now.press(), now.active.recipe) is not None:
+        if stop.ends_steps(now.press(), now.active.recipe):
             return Event.EARLY_STOP
         self._goes_on.set()
         return Event.MEASURED
@@ -342,7 +324,7 @@ class Inspector:
         """Let the fruit go: in the nest, where the line diverts it, or where its outcome belongs."""
         carried = self._settings.placing == "arm" and self._devices.cell.arm is not None
         if carried:
-            await self._grip(now).go("above_nest", "accept" if now.outcome_name == "PASS" else "reject")
+            await self._rig(now).go("above_nest", "accept" if now.outcome_name == "PASS" else "reject")
         width_mm = None if carried else self._width_around(now)
         try:
             await self._devices.cell.gripper.open(width_mm)
@@ -365,9 +347,9 @@ class Inspector:
         now.verdict = judge(now.press(), now.active.recipe)
         now.outcome_name = "NO_RESULT"
 
-    def _grip(self, now: Inspection, on_frame: Callable[[Frame], None] | None = None) -> Grip:
+    def _rig(self, now: Inspection, on_frame: Callable[[Frame], None] | None = None) -> DeviceRig:
         deadline_s = FRAME_DEADLINE_S * self._settings.patience
-        return Grip(self._devices.cell, now.active.recipe, deadline_s, on_frame or self._measure_ahead)
+        return DeviceRig(self._devices.cell, now.active.recipe, deadline_s, on_frame or self._measure_ahead)
 
     def _measure_ahead(self, frame: Frame) -> None:
         self._count(frame)
@@ -378,8 +360,8 @@ class Inspector:
         for fault in frame.faults or ("good",):
             self._metrics.frame(fault)
 
-    async def _touches(self, step: GripStep) -> bool:
+    async def _seen(self, step: Step) -> MeasuredStep:
+        """A step of the approach, measured by itself."""
         self._devices.monitors[CAMERA].report_success()
         self._devices.monitors[GRIPPER].report_success()
-        self._glanced = await self._vision.measure(step)
-        return self._glanced.contact.is_firm
+        return await self._vision.measure(step)

@@ -2,21 +2,20 @@
 
 import time
 from dataclasses import dataclass, field
-from math import ceil
 
 from station.channel.line import Outcome
 from station.inspection.centring import NOT_MOVED, Way
 from station.inspection.deadlines import Deadlines
-from station.inspection.evidence import AT_MM
 from station.inspection.judge import Judgement
 from station.inspection.press import Measured, Press
 from station.inspection.second_press import together
 from station.messages.message import Message
-from station.press.procedure import GripStep
+from station.press.measurement import measured_point
+from station.press.rig import MeasuredStep, Step
+from station.press.stop import steps_to_decide
 from station.records.first_press import first_press_findings, first_press_measures
 from station.records.judgement import judgement_measures
 from station.records.model import CurvePoint, Image, InspectionRecord, Trigger
-from station.runtime.imaging.worker import MeasuredStep
 from station.runtime.recipes.active import ActiveRecipe
 from station.vocabulary import OutcomeName, Reason
 
@@ -59,7 +58,7 @@ class Inspection:
     """Where it has to go before the next closing; None where it stays."""
     closed_steps: int = 0
     """Steps of the recipe by which the jaws have closed since the first image."""
-    steps: list[GripStep] = field(default_factory=list)
+    steps: list[Step] = field(default_factory=list)
     """Captured, in order; more than `closed_steps` where they are also taken while the jaws close."""
     seen: list[MeasuredStep] = field(default_factory=list)
     """Measured, in order."""
@@ -89,8 +88,7 @@ class Inspection:
     @property
     def steps_to_decide(self) -> int:
         """How many steps from the first image reach the damage threshold that decides."""
-        recipe = self.active.recipe
-        return min(recipe.steps.number, ceil((recipe.damage.deciding_closing_mm - AT_MM) / recipe.steps.step_mm))
+        return steps_to_decide(self.active.recipe)
 
     def _width_after(self, steps: int) -> float:
         return self.steps[0].move.width_mm - steps * self.active.recipe.steps.step_mm
@@ -153,7 +151,9 @@ class Inspection:
         if self.before_onset_mm is not None:
             untouched.append(self.before_onset_mm)
         sooner_mm = min(untouched) - onset_mm if untouched else 0.0
-        points = tuple(self._measured(seen, onset_mm) for seen in self.seen)
+        points = tuple(
+            measured_point(seen.contact, onset_mm - seen.step.move.width_mm, self.mm_per_px) for seen in self.seen
+        )
         return self._press(onset_mm, sooner_mm, points)
 
     def _press(self, onset_mm: float | None, sooner_mm: float, points: tuple[Measured, ...]) -> Press:
@@ -204,19 +204,6 @@ class Inspection:
             judgement=verdict.summary if verdict is not None else None,
             first_press_findings=first_press_findings(self.first_verdict),
             images=self._images(),
-        )
-
-    def _measured(self, seen: MeasuredStep, onset_mm: float) -> Measured:
-        contact = seen.contact
-        area_mm2 = contact.area_px * self.mm_per_px**2
-        return Measured(
-            closing_mm=onset_mm - seen.step.move.width_mm,
-            area_mm2=area_mm2,
-            area_px=contact.area_px,
-            confidence=contact.confidence,
-            flags=contact.flags,
-            changed_area_mm2=self._mm2(contact.changed_area_px),
-            changed_area_px=contact.changed_area_px,
         )
 
     def _point(self, number: int, seen: MeasuredStep, onset_mm: float | None) -> CurvePoint:

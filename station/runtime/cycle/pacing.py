@@ -6,8 +6,8 @@ from itertools import combinations
 from station.devices.arm.ur import POSES
 from station.inspection.deadlines import LONGEST_S, Deadlines, Late, Pace, deadlines, late
 from station.inspection.states import State
-from station.press.procedure import Cell
 from station.runtime.cycle.inspection import Inspection
+from station.runtime.devices.rig import Cell
 from station.settings.arm import ArmSettings
 from station.settings.configuration import Configuration
 from station.settings.recipe import Recipe

@@ -14,8 +14,8 @@ from station.inspection.cycle import START, Act, Action, Cycle, Event, Raise
 from station.inspection.states import State
 from station.messages import operation as messages
 from station.messages.message import Message, message_of
-from station.press.procedure import FramesError
 from station.records.errors import RecordsError
+from station.runtime.devices.rig import FramesError
 
 TICK_S = 0.1
 HALT_DEADLINE_S = 5.0

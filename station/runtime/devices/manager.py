@@ -22,9 +22,10 @@ from station.errors import StationError
 from station.messages import camera as camera_messages
 from station.messages import device as device_messages
 from station.messages import gripper as gripper_messages
-from station.press.procedure import FRAME_DEADLINE_S, Cell, FramesError
+from station.press.reference import are_open
 from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.monitor import DeviceMonitor
+from station.runtime.devices.rig import FRAME_DEADLINE_S, Cell, FramesError
 from station.settings.configuration import Configuration
 
 CAMERA, GRIPPER, ARM = "camera", "gripper", "arm"
@@ -36,7 +37,6 @@ _STALE_CHECKS = 3
 """Failed checks in a row that make a fault: one may be a moment's delay of this machine."""
 _ARM_PAUSE_S = 0.5
 """The driver reconnects to the arm by itself; only its state is read."""
-_OPEN_WITHIN_MM = 2.0
 _OVER_TEMPERATURE = 0x8
 
 
@@ -243,7 +243,7 @@ class DeviceManager:
         state = await self._arm.state()
         if state.fault is not None:
             raise state.fault
-        if state.at == "nest" and width_mm > self.cell.gripper.max_width_mm - _OPEN_WITHIN_MM:
+        if state.at == "nest" and are_open(width_mm, self.cell.gripper.max_width_mm):
             await self._arm.move_to("above_nest")
         elif state.at not in {"home", "above_nest"}:
             raise refusal

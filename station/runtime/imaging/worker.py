@@ -5,21 +5,18 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import TypeVar
 
 import cv2
 
-from station.devices.camera.interface import Frame, Image
-from station.press.procedure import GripStep
-from station.press.reference import ReferenceProperties, check_reference
+from station.press.measurement import PressMeasurement
+from station.press.reference import ReferenceProperties, check_reference, reference_image
+from station.press.rig import Frame, MeasuredStep, Step
 from station.runtime.imaging.golden_reference import GoldenReference
 from station.settings.segmentation import Segmentation
 from station.settings.service import ReferenceSettings
-from station.vision.contact import Contact, Method
-from station.vision.methods import make_method, median_image
-from station.vision.press import PressTracker
-from station.vision.step import mean_image
+from station.vision.contact import Contact, Image
+from station.vision.methods import make_method
 
 ResultT = TypeVar("ResultT")
 
@@ -28,22 +25,11 @@ _SWITCH_S = 0.0005
 moving gripper some twenty times in a step; Python's own 5 ms made that step up to 30 ms longer."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MeasuredStep:
-    """One width step as it was measured."""
-
-    step: GripStep
-    image: Image
-    """The frames' mean, shape (height, width, 3), dtype uint8, BGR."""
-    contact: Contact
-
-
 class VisionWorker:
     """Measurement against one reference at a time.
 
-    The jaws may open again while the onset is searched, so each step is measured by itself then. From `follow` on the
-    compression only rises: each step is measured with the contact of the step before. One thread does the work in the
-    order of the calls, so a frame's measurement ahead always uses the same earlier step as its step's measurement.
+    One thread does the work in the order of the calls, so a frame's measurement ahead always uses the same earlier step
+    as its step's measurement.
 
     Args:
         golden: reference that every new one is compared with.
@@ -55,11 +41,8 @@ class VisionWorker:
         cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))
         self._golden, self._settings = golden, settings
         self._worker = ThreadPoolExecutor(1, "vision")
-        self._method: Method | None = None
-        self._least_confidence = 0.0
-        self._tracker: PressTracker | None = None
-        """Of the press that is followed, or of the next step alone; only the worker thread uses it."""
-        self._follows = False
+        self._measurement: PressMeasurement | None = None
+        """Against the present reference; only the worker thread uses it."""
 
     def close(self) -> None:
         """Finish the work under way and end the thread."""
@@ -84,14 +67,12 @@ class VisionWorker:
         """
 
         def take() -> tuple[Image, ReferenceProperties]:
-            self._method = self._tracker = None
-            self._follows = False
-            image = median_image([frame.image for frame in frames])
+            self._measurement = None
+            image = reference_image(frames)
             properties = check_reference(image, self._golden.prepared(segmentation), self._settings)
             self._golden.store_first(image)
-            self._method, self._least_confidence = (
-                make_method([image], segmentation),
-                segmentation.robust.least_confidence,
+            self._measurement = PressMeasurement(
+                make_method([image], segmentation), segmentation.robust.least_confidence
             )
             return image, properties
 
@@ -101,7 +82,8 @@ class VisionWorker:
         """Measure each step by itself again, against the same reference, after the jaws were opened."""
 
         def begin() -> None:
-            self._tracker, self._follows = None, False
+            if self._measurement is not None:
+                self._measurement.begin()
 
         await self._do(begin)
 
@@ -111,11 +93,7 @@ class VisionWorker:
         Args:
             contact: of the press's first step, against this reference.
         """
-
-        def follow() -> None:
-            self._tracker, self._follows = self._new_tracker(contact), True
-
-        await self._do(follow)
+        await self._do(lambda: self._referenced().follow(contact))
 
     def measure_ahead(self, frame: Frame) -> None:
         """Start measuring one frame of the next step while more are captured; `measure` then has less to do.
@@ -125,33 +103,24 @@ class VisionWorker:
         """
 
         def measure() -> None:
-            if self._method is not None:
-                self._tracker = self._tracker or self._new_tracker()
-                self._tracker.prepare_next(frame.image)
+            if self._measurement is not None:
+                self._measurement.prepare_next(frame.image)
 
-        if self._method is not None:
+        if self._measurement is not None:
             self._worker.submit(measure)
 
-    async def measure(self, step: GripStep) -> MeasuredStep:
+    async def measure(self, step: Step) -> MeasuredStep:
         """Find the contact in a step's frames.
 
         Args:
             step: with frames of the reference's shape.
         """
+        return await self._do(lambda: self._referenced().measure(step))
 
-        def measure() -> MeasuredStep:
-            tracker = self._tracker or self._new_tracker()
-            if not self._follows:
-                self._tracker = None
-            images = [frame.image for frame in step.frames]
-            return MeasuredStep(step, mean_image(images), tracker.measure_step(images))
-
-        return await self._do(measure)
-
-    def _new_tracker(self, first: Contact | None = None) -> PressTracker:
-        if self._method is None:
+    def _referenced(self) -> PressMeasurement:
+        if self._measurement is None:
             raise RuntimeError("a step is measured before the reference was taken")
-        return PressTracker(self._method, self._least_confidence, first)
+        return self._measurement
 
     async def _do(self, work: Callable[[], ResultT]) -> ResultT:
         return await asyncio.get_running_loop().run_in_executor(self._worker, work)

@@ -36,12 +36,12 @@ from station.messages.maintenance import UNDER_WAY
 from station.messages.message import Message, joined, message_of
 from station.records.audit import AuditEntry, append_audit
 from station.records.records import Records
-from station.runtime.devices.calibration_rig import StationRig
+from station.runtime.devices.calibration_rig import CalibrationRig
 from station.runtime.observability.audit_logger import AuditLogger, calibration_entry, verification_entry
 from station.runtime.production.production import Production
 from station.runtime.rpc.worker import PanelWorker
 from station.settings.configuration import Configuration
-from station.settings.recipe import find_recipe
+from station.settings.recipe import Recipe, find_recipe
 
 ANSWERED_S = 600.0
 """Longest wait for a person to lay the ball."""
@@ -207,11 +207,15 @@ class PanelCalibration:
         finally:
             run.request = None
 
+    def _rig(self, run: _Run, recipe: Recipe) -> CalibrationRig:
+        patience = self._site.service.patience
+        return CalibrationRig(self._devices.cell, recipe, lambda place: self._lay(run, place), patience)
+
     async def _calibrate(self, run: _Run, request: StartCalibrationRun) -> None:
         recipe = await self._worker.do(lambda: find_recipe(self._site.calibration.recipe, self._site.recipes_folder))
-        bench = StationRig(self._devices.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
+        rig = self._rig(run, recipe)
         draft = await CalibrationProcedure(
-            bench,
+            rig,
             self._unit(),
             recipe,
             self._site.calibration,
@@ -237,9 +241,9 @@ class PanelCalibration:
         golden, presses = await self._worker.do(
             lambda: (self._store.golden(calibration), self._store.presses(calibration))
         )
-        bench = StationRig(self._devices.cell, recipe, lambda place: self._lay(run, place), self._site.service.patience)
+        rig = self._rig(run, recipe)
         verified = await VerificationProcedure(
-            bench,
+            rig,
             recipe,
             self._site.calibration,
             calibration,

@@ -1,0 +1,75 @@
+"""Press measurement: the contact of each step, by itself while the onset is searched, then as a step of one press."""
+
+from station.inspection.press import Measured
+from station.press.rig import MeasuredStep, Step
+from station.vision.contact import Contact, Image, Method
+from station.vision.press import PressTracker
+
+
+class PressMeasurement:
+    """Measurement of one press against one reference. Not safe for use from several threads at once.
+
+    The jaws may open again while the onset is searched, so each step is measured by itself then. From `follow` on the
+    compression only rises: each step is measured with the contact of the step before.
+
+    Args:
+        method: prepared for the reference.
+        least_confidence: the recipe's; below it a contact is flagged.
+    """
+
+    def __init__(self, method: Method, least_confidence: float) -> None:
+        self._method, self._least_confidence = method, least_confidence
+        self._tracker: PressTracker | None = None
+        """Of the press that is followed, or of the next step alone."""
+        self._follows = False
+
+    def begin(self) -> None:
+        """Measure each step by itself, against the same reference, after the jaws were opened."""
+        self._tracker, self._follows = None, False
+
+    def follow(self, first: Contact) -> None:
+        """Measure every later step as a step of one press.
+
+        Args:
+            first: the contact of the press's first step.
+        """
+        self._tracker, self._follows = PressTracker(self._method, self._least_confidence, first), True
+
+    def prepare_next(self, image: Image) -> None:
+        """Measure one frame of the next step while more are captured; `measure` then has less to do.
+
+        Args:
+            image: of the reference's shape; the same object comes with the step.
+        """
+        self._tracker = self._tracker or PressTracker(self._method, self._least_confidence)
+        self._tracker.prepare_next(image)
+
+    def measure(self, step: Step) -> MeasuredStep:
+        """Find the contact in a step's frames.
+
+        Args:
+            step: with frames of the reference's shape.
+        """
+        tracker = self._tracker or PressTracker(self._method, self._least_confidence)
+        if not self._follows:
+            self._tracker = None
+        return MeasuredStep(step, step.image, tracker.measure_step(step.images))
+
+
+def measured_point(contact: Contact, closing_mm: float, mm_per_px: float) -> Measured:
+    """Return a contact as the judge takes it.
+
+    Args:
+        closing_mm: of its step, from the onset.
+        mm_per_px: the sensor's scale.
+    """
+    changed_px = contact.changed_area_px
+    return Measured(
+        closing_mm=closing_mm,
+        area_mm2=contact.area_px * mm_per_px**2,
+        area_px=contact.area_px,
+        confidence=contact.confidence,
+        flags=contact.flags,
+        changed_area_mm2=None if changed_px is None else changed_px * mm_per_px**2,
+        changed_area_px=changed_px,
+    )

@@ -1,0 +1,155 @@
+"""The press procedure on a rig that is only written down: its order, its end, and what stops it."""
+
+import asyncio
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from station.press.procedure import press
+from station.press.reference import JawsNotOpenError
+from station.press.rig import MeasuredStep, Position, Step
+from station.press.stop import NothingTouchedError, UnseenContactError, is_last_step, may_decide
+from station.settings.recipe import find_recipe
+
+BLUEBERRY, BALL = find_recipe("blueberry"), find_recipe("rubber_ball")
+WIDEST_MM, FRUIT_MM = 53.0, 15.3
+
+
+class WrittenRig:
+    """Fingers that are where they were sent, and note each verb."""
+
+    widest_mm, finest_step_mm = WIDEST_MM, 0.4
+
+    def __init__(self, opens_to_mm: float = WIDEST_MM, held_mm: float = 0.0, *, fruit_mm: float = FRUIT_MM) -> None:
+        self.verbs: list[str] = []
+        self._fruit_mm = fruit_mm
+        self._width_mm, self._opens_to_mm, self._held_mm, self._now_s = 20.0, opens_to_mm, held_mm, 0.0
+
+    async def make_ready(self) -> None:
+        self.verbs.append("ready")
+
+    async def leave_nest(self) -> None:
+        self.verbs.append("leave")
+
+    async def enter_nest(self) -> None:
+        self.verbs.append("enter")
+
+    async def open(self, width_mm: float | None = None) -> Position:
+        self.verbs.append("open")
+        self._width_mm = min(self._opens_to_mm, WIDEST_MM if width_mm is None else width_mm)
+        return await self.read()
+
+    async def close_to(self, width_mm: float) -> Position:
+        self.verbs.append("close")
+        self._width_mm = max(width_mm, self._held_mm)
+        return await self.read()
+
+    async def settle(self) -> None:
+        self.verbs.append("settle")
+
+    async def frame(self, newer_than_s: float) -> Any:
+        await asyncio.sleep(0)
+        self._now_s = newer_than_s + 0.03
+        image = np.full((2, 2, 3), 1 if self._width_mm < self._fruit_mm else 0, np.uint8)
+        return SimpleNamespace(image=image, sequence=1, captured_s=self._now_s)
+
+    async def frames(self, number: int) -> tuple[Any, ...]:
+        self.verbs.append(f"frames {number}")
+        return tuple([await self.frame(self._now_s) for _ in range(number)])
+
+    async def read(self) -> Position:
+        held = self._held_mm > 0 and self._width_mm <= self._held_mm
+        return Position(self._width_mm, self._now_s, held, blocked=held)
+
+    async def stop(self, moving: asyncio.Future[Position]) -> None:
+        await moving
+
+    async def release(self, failed: Any = None) -> None:
+        self.verbs.append("release" if failed is None else "release after a fault")
+
+
+class WrittenObserver:
+    """Notes the steps, and lets so many of them be made."""
+
+    def __init__(self, most: int = 100) -> None:
+        self.most, self.references, self.steps = most, 0, cast("list[Step]", [])
+
+    async def see_reference(self, untouched: Step) -> None:
+        self.references = len(untouched.frames)
+
+    async def measure(self, step: Step) -> MeasuredStep:
+        return cast("MeasuredStep", SimpleNamespace(step=step, contact=SimpleNamespace(is_firm=step.image.any())))
+
+    async def see_step(self, step: Step) -> bool:
+        self.steps.append(step)
+        return len(self.steps) < self.most
+
+
+def test_a_press_takes_the_reference_away_from_the_nest_then_steps_then_releases():
+    rig, observer = WrittenRig(), WrittenObserver()
+    asyncio.run(press(rig, BALL, observer))
+    number = BALL.imaging.reference_frames
+    step = ["close", "settle", f"frames {BALL.imaging.frames_per_step}"]
+    begin = ["ready", "open", "leave", f"frames {number}", "enter"]
+    assert rig.verbs == [*begin, *step * (1 + BALL.steps.number), "release"]
+    assert observer.references == number
+    widths_mm = [each.move.width_mm for each in observer.steps]
+    assert np.diff(widths_mm) == pytest.approx([-BALL.steps.step_mm] * BALL.steps.number)
+
+
+def test_an_onset_is_found_to_the_finest_step_and_the_step_before_it_is_handed_on_first():
+    rig, observer = WrittenRig(), WrittenObserver(most=4)
+    asyncio.run(press(rig, BLUEBERRY, observer))
+    before, start, *steps = observer.steps
+    assert (before.number, start.number) == (-1, 0)
+    assert before.move.width_mm >= FRUIT_MM > start.move.width_mm
+    assert before.move.width_mm - start.move.width_mm == pytest.approx(rig.finest_step_mm)
+    assert [each.number for each in steps] == [1, 2], "the observer ends the steps"
+    assert rig.verbs[-1] == "release"
+
+
+def test_no_reference_is_taken_where_the_jaws_do_not_open():
+    rig, observer = WrittenRig(opens_to_mm=50.0), WrittenObserver()
+    with pytest.raises(JawsNotOpenError):
+        asyncio.run(press(rig, BALL, observer))
+    assert rig.verbs == ["ready", "open", "release after a fault"]
+
+
+@pytest.mark.parametrize(("held_mm", "error"), [(15.5, UnseenContactError), (0.0, NothingTouchedError)])
+def test_fingers_that_touch_nothing_release_and_name_what_held_them(held_mm, error):
+    rig = WrittenRig(held_mm=held_mm, fruit_mm=0.0)
+    with pytest.raises(error):
+        asyncio.run(press(rig, BLUEBERRY, WrittenObserver()))
+    assert rig.verbs[-1] == "release after a fault"
+
+
+def test_a_press_that_is_called_off_releases():
+    rig, observer = WrittenRig(), WrittenObserver()
+
+    async def scenario() -> None:
+        pressing = asyncio.ensure_future(press(rig, BLUEBERRY, observer))
+        while not observer.steps:
+            await asyncio.sleep(0)
+        pressing.cancel()
+        await pressing
+
+    with pytest.raises(asyncio.CancelledError):
+        asyncio.run(scenario())
+    assert rig.verbs[-1] == "release after a fault"
+
+
+def test_the_last_step_is_the_recipes_the_force_limits_or_that_of_closed_fingers():
+    number, free, held = BLUEBERRY.steps.number, Position(10.0), Position(10.0, held=True)
+    assert not is_last_step(BLUEBERRY, number - 1, 1.0, free)
+    assert is_last_step(BLUEBERRY, number, 1.0, free)
+    assert is_last_step(BLUEBERRY, 1, 1.0, held)
+    assert is_last_step(BLUEBERRY, 1, 0.0, free)
+
+
+def test_a_measurement_is_awaited_only_where_the_step_may_decide():
+    deciding_mm = BLUEBERRY.damage.deciding_closing_mm
+    assert may_decide(BLUEBERRY, deciding_mm) == BLUEBERRY.steps.stop_when_decided
+    assert not may_decide(BLUEBERRY, deciding_mm - 0.5)
+    assert not may_decide(BLUEBERRY, None)
