@@ -166,19 +166,16 @@ class ImageStore:
         self.size_bytes += len(content)
 
     def _make_space(self, needed_bytes: int, *, accepted: bool) -> None:
-        """Remove the oldest of the accepted, then of the others, until the new ones fit into the quota.
+        """Remove older images until the new ones fit into the quota; what goes first is in `retention`.
 
-        They are removed as well if the disk is nearly full: images must not take the space that inspections need. An
-        accepted fruit's images never displace a rejected one's.
+        They are removed as well if the disk is nearly full: images must not take the space that inspections need.
         """
         quota_bytes = self._settings.images_quota_mb * MB
         if needed_bytes > quota_bytes:
             raise _NotStoredError(f"they need {needed_bytes} bytes, records.images_quota_mb allows {quota_bytes}")
         reserve_bytes = 2 * self._settings.free_reserve_mb * MB
         while (over := self.size_bytes + needed_bytes > quota_bytes) or self._free_bytes() < reserve_bytes:
-            removed = self._record(lambda connection: remove_oldest_images(connection, accepted=True))
-            if removed is None and not accepted:
-                removed = self._record(lambda connection: remove_oldest_images(connection, accepted=False))
+            removed = self._record(lambda connection: remove_oldest_images(connection, for_accepted=accepted))
             if removed is None:
                 whose = "the quota is full of" if over else "the disk is nearly full, beside"
                 raise _NotStoredError(f"{whose} images of rejected fruit, or on hold")

@@ -1,26 +1,27 @@
 """Image retention: images removed for space, and lost images after a crash."""
 
-from sqlalchemy import Connection, delete, func, select
+from sqlalchemy import ColumnElement, Connection, delete, func, select
 
 from station.records.holds import is_held
 from station.records.schema import images, inspections
 from station.records.write_requests import add_event, add_images
 
 
-def remove_oldest_images(connection: Connection, *, accepted: bool) -> tuple[int, list[str]] | None:
-    """Remove the images of the oldest accepted, or else the oldest other inspection that has some and is not on hold.
+def remove_oldest_images(connection: Connection, *, for_accepted: bool) -> tuple[int, list[str]] | None:
+    """Remove the images of the inspection that goes first: the oldest accepted one, then the oldest of the others.
+
+    An accepted fruit's images never displace a rejected one's, and what is on hold stays.
+
+    Args:
+        for_accepted: whether the space is for an accepted fruit's images.
 
     Returns:
-        The freed bytes and the names of the files that no row refers to any more; None if there is none.
+        The freed bytes and the names of the files that no row refers to any more; None if none may go.
     """
-    kind = inspections.c.outcome == "PASS" if accepted else inspections.c.outcome != "PASS"
-    oldest = connection.scalar(
-        select(images.c.sequence)
-        .join(inspections, inspections.c.sequence == images.c.sequence)
-        .where(kind, ~is_held())
-        .order_by(images.c.sequence)
-        .limit(1)
-    )
+    accepted = inspections.c.outcome == "PASS"
+    oldest = _oldest(connection, accepted)
+    if oldest is None and not for_accepted:
+        oldest = _oldest(connection, ~accepted)
     if oldest is None:
         return None
     rows = connection.execute(select(images.c.sha256, images.c.size_bytes).where(images.c.sequence == oldest)).all()
@@ -30,6 +31,17 @@ def remove_oldest_images(connection: Connection, *, accepted: bool) -> tuple[int
     free = {name: size for name, size in sizes.items() if name not in kept}
     add_images(connection, oldest, (), "removed: space for newer ones")
     return sum(free.values()), list(free)
+
+
+def _oldest(connection: Connection, kind: ColumnElement[bool]) -> int | None:
+    """Return the oldest inspection of a kind that has images and is not on hold."""
+    return connection.scalar(
+        select(images.c.sequence)
+        .join(inspections, inspections.c.sequence == images.c.sequence)
+        .where(kind, ~is_held())
+        .order_by(images.c.sequence)
+        .limit(1)
+    )
 
 
 def referred(connection: Connection) -> dict[str, int]:

@@ -287,7 +287,7 @@ class TestPeopleFile:
         def full(_):
             raise OSError(28, "No space left on device")
 
-        monkeypatch.setattr("hmi.web.user_store.os.fsync", full)
+        monkeypatch.setattr("station.atomic_file.os.fsync", full)
         with pytest.raises(UserStoreError, match="No space left"):
             people.put("Ana", Role.OPERATOR, "7391")
         assert people.path.read_bytes() == before

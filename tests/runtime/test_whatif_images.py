@@ -61,7 +61,7 @@ def test_a_draft_with_another_segmentation_measures_the_stored_images_again(insp
     assert again_mm2[-1] == pytest.approx(stored_mm2[-1], rel=0.5), "the same contact by another edge"
     page = (out / "whatif.html").read_text()
     assert "data:image/jpeg;base64," in page
-    assert page.count("<polyline") == 2, "the curve of then, and the draft's"
+    assert page.count('<polyline class="curve ') == 2, "the curve of then, and the draft's"
 
     told, out = whatif("same")
     assert "measured again" not in told
