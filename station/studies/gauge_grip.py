@@ -14,7 +14,7 @@ from station.press.rig import MeasuredStep, Position, Step
 from station.press.stop import NothingTouchedError, ends_steps
 from station.settings.gripper import GripperCalibration
 from station.settings.recipe_model import Recipe
-from station.studies.simulated_rig import SimulatedFrame, StandingRig
+from station.studies.simulated_rig import SimulatedFrame, StationaryRig
 from station.twin.contact import FruitOnGel, Pose
 from station.twin.digit.sensor import DigitSensor
 from station.twin.fruit import Fruit
@@ -73,7 +73,7 @@ class Onset(NamedTuple):
     contact: Contact
 
 
-class FruitRig(StandingRig):
+class FruitRig(StationaryRig):
     """A press rig with one fruit between gel and sponge. Its widths are the true ones.
 
     Args:

@@ -27,7 +27,7 @@ class SimulatedFrame(NamedTuple):
     sequence: int = 0
 
 
-class StandingRig:
+class StationaryRig:
     """The verbs that do nothing on a rig without an arm, whose moves take their time at once."""
 
     async def make_ready(self) -> None:
@@ -43,7 +43,7 @@ class StandingRig:
         """Do nothing: the time has passed."""
 
 
-class SimulatedRig(StandingRig):
+class SimulatedRig(StationaryRig):
     """A rig whose widths are whole counts of the gripper, and whose light drifts from step to step.
 
     Args:
