@@ -24,19 +24,13 @@ from hmi.api.model import (
     RecipeList,
     RecipeSummary,
 )
+from hmi.past.past import UnknownInspectionError
 from hmi.web.access import HmiNow
 from hmi.web.roles import Right
-from station.channel.messages import RefusedError
 from station.channel.panel import Actor, AlarmList, ListAlarms
 from station.channel.panel_maintenance_queries import GetHealth, Health
 from station.channel.panel_queries import (
     EndLot,
-    FindInspections,
-    GetInspection,
-    InspectionPage,
-    InspectionView,
-    ListLots,
-    Lots,
     LotView,
     Search,
     StartLot,
@@ -112,8 +106,7 @@ async def inspections(
         from_utc_ms=_utc_ms(begun_from),
         to_utc_ms=_utc_ms(begun_to),
     )
-    query = FindInspections(search=search, limit=limit, below=below)
-    page = await hmi.gateway.request(query, InspectionPage, deadline_s=DEADLINE_S)
+    page = await hmi.past.find(search, limit, below)
     return InspectionList(inspections=[InspectionSummary.of(row) for row in page.rows], below=page.below)
 
 
@@ -121,8 +114,8 @@ async def inspections(
 async def inspection(hmi: HmiNow, _: Reader, sequence: Sequence) -> InspectionDetails:
     """One inspection with its curve."""
     try:
-        reply = await hmi.gateway.request(GetInspection(sequence=sequence), InspectionView, deadline_s=DEADLINE_S)
-    except RefusedError as error:
+        reply = await hmi.past.inspection(sequence)
+    except UnknownInspectionError as error:
         raise HTTPException(404, str(error)) from error
     return InspectionDetails.of(reply)
 
@@ -151,17 +144,16 @@ async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeDetails:
 @router.get("/lots", tags=["lots"])
 async def lots(hmi: HmiNow, _: Reader, limit: Annotated[int, Query(ge=1, le=100)] = 20) -> LotList:
     """The latest lots."""
-    reply = await hmi.gateway.request(ListLots(limit=limit), Lots, deadline_s=DEADLINE_S)
-    return LotList(lots=[LotAnswer.of(each) for each in reply.lots])
+    return LotList(lots=[LotAnswer.of(each) for each in await hmi.past.lots(limit)])
 
 
 @router.get("/lots/{name}", tags=["lots"], responses=_NOT_FOUND)
 async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAnswer:
     """One lot."""
-    reply = await hmi.gateway.request(ListLots(name=name), Lots, deadline_s=DEADLINE_S)
-    if not reply.lots:
+    found = await hmi.past.lots(name=name)
+    if not found:
         raise HTTPException(404, f"nobody told of a lot {name}")
-    return LotAnswer.of(reply.lots[0])
+    return LotAnswer.of(found[0])
 
 
 @router.put("/lots/{name}", tags=["lots"])
@@ -174,7 +166,7 @@ async def begin_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Pat
 @router.post("/lots/{name}/end", tags=["lots"], responses=_NOT_FOUND)
 async def end_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()]) -> LotAnswer:
     """End a lot. Idempotent."""
-    if not (await hmi.gateway.request(ListLots(name=name), Lots, deadline_s=DEADLINE_S)).lots:
+    if not await hmi.past.lots(name=name):
         raise HTTPException(404, f"nobody told of a lot {name}; tell of its begin first")
     query = EndLot(name=name, actor=actor)
     return LotAnswer.of(await hmi.gateway.request(query, LotView, deadline_s=DEADLINE_S))

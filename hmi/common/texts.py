@@ -54,6 +54,7 @@ define(
     "The station did not answer in time. Its state shows whether the command was carried out.",
 )
 define("problem.refused", "The station refused:")
+define("problem.records", "The stored inspections could not be read:")
 define("problem.broken", "The pages had an internal fault; their log has the details. The station continues.")
 
 define("role.viewer", "Viewer")

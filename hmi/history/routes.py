@@ -20,22 +20,15 @@ from hmi.web.sessions import Caller
 from hmi.web.translation import Locale
 from station.channel.panel import Actor
 from station.channel.panel_queries import (
-    AuditRows,
-    FindInspections,
-    GetImage,
-    GetInspection,
-    GetStages,
     InspectionPage,
     InspectionView,
     JobView,
-    Picture,
-    ReadAudit,
     Search,
     Stages,
     StartExport,
     StartLotReport,
 )
-from station.channel.panel_recipe_queries import ListRecipes, Recipes
+from station.channel.panel_recipe_queries import ListRecipes, RecipeRow, Recipes
 from station.charts.area_chart import Curve, Limit
 from station.charts.spark import spark
 from station.messages.reasons import reason_message
@@ -93,9 +86,10 @@ async def search(
     wanted = None if typed else search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
     found = InspectionPage(rows=(), below=None)
     if wanted is not None:
-        find = FindInspections(search=wanted, limit=PAGE, below=below)
-        found = await hmi.gateway.request(find, InspectionPage, deadline_s=DEADLINE_S)
-    recipes = await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
+        found = await hmi.past.find(wanted, PAGE, below)
+    recipes: tuple[RecipeRow, ...] = ()  # while the station is away fruit have no titles, and are found all the same
+    if hmi.gateway.fresh:
+        recipes = (await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)).rows
     return show(
         request,
         "history.html.j2",
@@ -104,8 +98,8 @@ async def search(
         bad=wanted is None,
         found=found,
         below=below,
-        recipes=recipes.rows,
-        titles={row.name: row.title for row in recipes.rows},
+        recipes=recipes,
+        titles={row.name: row.title for row in recipes},
         reasons=tuple(Reason),
         spark=spark,
         may_export=bool(caller_of(request).name),
@@ -145,15 +139,14 @@ async def report(hmi: HmiNow, caller: GenuineCaller, lot: Annotated[str, Form(ma
 @router.get("/audit")
 async def audit(request: Request, hmi: HmiNow, action: Words = "", subject: Words = "") -> Response:
     """Show the latest rows of the audit trail."""
-    query = ReadAudit(limit=100, action=action, subject=subject)
-    reply = await hmi.gateway.request(query, AuditRows, deadline_s=DEADLINE_S)
-    return show(request, "history_audit.html.j2", rows=reply.rows, action=action, subject=subject)
+    rows = await hmi.past.audit(100, action, subject)
+    return show(request, "history_audit.html.j2", rows=rows, action=action, subject=subject)
 
 
 @router.get("/image/{sha256}.png")
 async def image(hmi: HmiNow, sha256: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]) -> Response:
     """Send a stored image; its address is its content hash, so the browser fetches it once."""
-    reply = await hmi.gateway.request(GetImage(sha256=sha256), Picture, deadline_s=DEADLINE_S)
+    reply = await hmi.past.image(sha256)
     return Response(reply.data, media_type=reply.media_type, headers=_FOR_EVER)
 
 
@@ -214,7 +207,7 @@ async def _stages(hmi: Hmi, sequence: int, step: int) -> Stages:
         return known
     if not (0 < sequence < 2**32 and 0 <= step <= 1000):
         raise Problem(404, "problem.not_found")
-    reply = await hmi.gateway.request(GetStages(sequence=sequence, step=step), Stages, deadline_s=DEADLINE_S)
+    reply = await hmi.past.stages(sequence, step)
     _STAGES[sequence, step] = reply
     while len(_STAGES) > _KEPT_STAGES:
         _STAGES.popitem(last=False)
@@ -224,7 +217,7 @@ async def _stages(hmi: Hmi, sequence: int, step: int) -> Stages:
 async def _inspection(hmi: Hmi, sequence: int) -> InspectionView:
     if not 0 < sequence < 2**32:
         raise Problem(404, "problem.not_found")
-    return await hmi.gateway.request(GetInspection(sequence=sequence), InspectionView, deadline_s=DEADLINE_S)
+    return await hmi.past.inspection(sequence)
 
 
 def _steps(reply: InspectionView) -> list[dict[str, Any]]:

@@ -14,6 +14,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from hmi.api.model import ApiMessage, Error
+from hmi.past.past import Past
 from hmi.web.access import locale_of
 from hmi.web.assets import Assets
 from hmi.web.context import Hmi
@@ -29,6 +30,7 @@ from hmi.web.sessions import Sessions
 from hmi.web.user_store import UserStore
 from station.channel.messages import ChannelError, DeadlineError
 from station.channel.panel_live import PersonNoted
+from station.errors import StationError
 from station.messages.message import Message
 from station.settings.configuration import Configuration
 from station.settings.hmi import panel_endpoint
@@ -51,6 +53,7 @@ def make_context(site: Configuration) -> Hmi:
     return Hmi(
         settings=settings,
         gateway=gateway,
+        past=Past(site.home / "records"),
         sessions=Sessions(settings.idle_s),
         people=UserStore(site.home / FOLDER),
         pins=LoginRateLimiter(),
@@ -66,7 +69,9 @@ def make_app(hmi: Hmi) -> SecurityMiddleware:
 
     @contextlib.asynccontextmanager
     async def running(_: FastAPI) -> AsyncIterator[None]:
-        async with hmi.gateway:
+        async with contextlib.AsyncExitStack() as stack:
+            stack.enter_context(hmi.past)
+            await stack.enter_async_context(hmi.gateway)
             sweeping = asyncio.create_task(_sweep(hmi), name="logging out who is idle")
             try:
                 yield
@@ -86,6 +91,7 @@ def make_app(hmi: Hmi) -> SecurityMiddleware:
             HTTPException: _http,
             RequestValidationError: _bad_form,
             ChannelError: _away,
+            StationError: _unread,
             Exception: _broken,
         },
     )
@@ -132,6 +138,12 @@ async def _away(request: Request, error: Exception) -> Response:
     if isinstance(error, DeadlineError):
         return _problem_answer(request, 503, locale_of(request).text("problem.no_answer"), error.message)
     return _problem_answer(request, 409, locale_of(request).text("problem.refused"), error.message)
+
+
+async def _unread(request: Request, error: Exception) -> Response:
+    """Answer that the records do not have it, or cannot be read."""
+    assert isinstance(error, StationError)  # noqa: S101 (what it is registered for)
+    return _problem_answer(request, 409, locale_of(request).text("problem.records"), error.message)
 
 
 async def _broken(request: Request, _: Exception) -> Response:

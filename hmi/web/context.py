@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from hmi.past.past import Past
 from hmi.web.assets import Assets
 from hmi.web.gateway import Gateway
 from hmi.web.live import Live
@@ -18,6 +19,7 @@ class Hmi:
 
     settings: HmiSettings
     gateway: Gateway
+    past: Past
     sessions: Sessions
     people: UserStore
     pins: LoginRateLimiter

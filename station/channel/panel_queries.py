@@ -38,16 +38,6 @@ class Search(ChannelMessage):
     reason: Reason | None = None
 
 
-class FindInspections(ChannelMessage):
-    """Query one page of a search's results, newest first."""
-
-    purpose: ClassVar[str] = "for inspections"
-    search: Search = Search()
-    limit: int = Field(default=20, ge=1, le=LARGEST_PAGE)
-    below: int | None = Field(default=None, ge=1, le=2**32)
-    """Of the page before; None for the first."""
-
-
 class InspectionRow(ChannelMessage):
     """One inspection in a list."""
 
@@ -70,13 +60,6 @@ class InspectionPage(ChannelMessage):
     rows: tuple[InspectionRow, ...]
     below: int | None
     """The cursor of the next page; None for the last one."""
-
-
-class GetInspection(ChannelMessage):
-    """Query all data of one inspection."""
-
-    purpose: ClassVar[str] = "for an inspection"
-    sequence: Sequence
 
 
 class CurvePointView(ChannelMessage):
@@ -142,27 +125,12 @@ class InspectionView(ChannelMessage):
     size_class: int | None = None
 
 
-class GetImage(ChannelMessage):
-    """Query a stored image's file."""
-
-    purpose: ClassVar[str] = "for an image"
-    sha256: Sha256
-
-
 class Picture(ChannelMessage):
     """A picture's file."""
 
     model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
     media_type: str
     data: bytes
-
-
-class GetStages(ChannelMessage):
-    """Query the measurement of one step's image, stage by stage, by the inspection's own recipe."""
-
-    purpose: ClassVar[str] = "for a step's stages"
-    sequence: Sequence
-    step: int = Field(ge=0, le=1000)
 
 
 class Stages(ChannelMessage):
@@ -173,14 +141,6 @@ class Stages(ChannelMessage):
     """As measured again."""
 
 
-class ListLots(ChannelMessage):
-    """Query the latest lots, or one of them."""
-
-    purpose: ClassVar[str] = "for the lots"
-    limit: int = Field(default=20, ge=1, le=LARGEST_PAGE)
-    name: Annotated[str, Field(max_length=32)] | None = None
-
-
 class LotView(ChannelMessage):
     """One lot."""
 
@@ -189,12 +149,6 @@ class LotView(ChannelMessage):
     began_utc_ms: int
     ended_utc_ms: int | None
     revision: int
-
-
-class Lots(ChannelMessage):
-    """Newest first."""
-
-    lots: tuple[LotView, ...]
 
 
 class StartLot(ChannelMessage):
@@ -214,17 +168,6 @@ class EndLot(ChannelMessage):
     actor: Actor
 
 
-class ReadAudit(ChannelMessage):
-    """Query the latest rows of the audit trail."""
-
-    purpose: ClassVar[str] = "for the audit trail"
-    limit: int = Field(default=50, ge=1, le=LARGEST_PAGE)
-    action: Text = ""
-    """Of this action, or of all that begin so."""
-    subject: Text = ""
-    """With this text in their subject."""
-
-
 class AuditRowView(ChannelMessage):
     """One row of the audit trail; `old` and `new` are JSON, shortened where they are long."""
 
@@ -237,12 +180,6 @@ class AuditRowView(ChannelMessage):
     reason: str
     old: str
     new: str
-
-
-class AuditRows(ChannelMessage):
-    """Newest first."""
-
-    rows: tuple[AuditRowView, ...]
 
 
 class StartExport(ChannelMessage):

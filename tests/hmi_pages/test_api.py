@@ -9,7 +9,8 @@ import schemathesis
 from hypothesis import HealthCheck, given, settings
 
 from hmi.web.roles import Role
-from station.channel.panel_queries import AuditRows, ReadAudit
+from station.records.audit_report import read_audit
+from station.records.database import reading as open_records
 
 pytestmark = pytest.mark.timeout(400)
 
@@ -95,9 +96,8 @@ def test_a_lot_is_begun_and_ended_and_the_trail_knows_by_whom(orchard: Any, api:
     assert api("PUT", "/api/v1/lots/L-7", token=writing, json_body={"grower": "another"}).status == 409
     assert api("POST", "/api/v1/lots/L-7/end", token=writing).body["ended"] is not None
     assert api("GET", "/api/v1/lots/L-7", token=writing).body["ended"] is not None
-    rows = orchard.over_the_panel(
-        lambda client: client.request(ReadAudit(action="lot.", subject="L-7"), AuditRows, deadline_s=20)
-    ).rows
+    with open_records(orchard.home / "records") as connection:
+        rows = read_audit(connection, 50, "lot.", "L-7")
     assert {(row.who, row.role, row.action) for row in rows} == {
         ("writing", "operator", "lot.told"),
         ("writing", "operator", "lot.ended"),

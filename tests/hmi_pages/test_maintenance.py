@@ -7,14 +7,15 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from station.channel.panel_queries import AuditRows, ReadAudit
+from station.records.audit_report import read_audit
+from station.records.database import reading
 
 pytestmark = pytest.mark.timeout(400)
 
 
 def audited(site: Any, action: str) -> list[Any]:
-    asked = ReadAudit(action=action)
-    return list(site.over_the_panel(lambda client: client.request(asked, AuditRows, deadline_s=20)).rows)
+    with reading(site.home / "records") as connection:
+        return read_audit(connection, 50, action, "")[::-1]
 
 
 def holding(page: Page, address: str) -> list[Any]:

@@ -9,15 +9,16 @@ from playwright.sync_api import Page, expect
 
 from hmi.recipes.form import BadFieldError, changed, formatted, groups
 from hmi.recipes.strip import strip
-from station.channel.panel_queries import AuditRows, ReadAudit
+from station.records.audit_report import read_audit
+from station.records.database import reading
 from station.settings.recipe import load_recipes
 
 pytestmark = pytest.mark.timeout(400)
 
 
 def audited(site: Any, action: str) -> list[Any]:
-    asked = ReadAudit(action=action)
-    return list(site.over_the_panel(lambda client: client.request(asked, AuditRows, deadline_s=20)).rows)
+    with reading(site.home / "records") as connection:
+        return read_audit(connection, 50, action, "")[::-1]
 
 
 def edit(page: Page, field: str, value: str) -> None:

@@ -13,10 +13,10 @@ import pytest
 
 from station.channel.panel_queries import JobView
 from station.channel.panel_recipe_queries import ListRecipes, Recipes
+from station.channel.worker import MOST_WAITING as MOST_QUESTIONS
+from station.channel.worker import PanelBusyError, PanelWorker
 from station.runtime.rpc.jobs import MOST_WAITING, JobError, PanelJobs
 from station.runtime.rpc.recipes import PanelRecipes
-from station.runtime.rpc.worker import MOST_WAITING as MOST_QUESTIONS
-from station.runtime.rpc.worker import PanelBusyError, PanelWorker
 from station.settings.recipe import load_recipes
 
 PATIENCE_S = 60.0

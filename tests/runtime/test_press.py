@@ -7,12 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from station.channel.panel_queries import GetStages
+from hmi.past.pictures import read_stages
 from station.messages.judge import EDGE_LOST
 from station.records.database import records_folder
 from station.runtime.imaging import worker as vision_worker
-from station.runtime.rpc.pictures import PanelPictures
-from station.runtime.rpc.worker import PanelWorker
 from station.vision.methods import make_method
 from station.vocabulary import Flag, Reason
 
@@ -83,18 +81,9 @@ def test_each_step_is_measured_with_the_contact_of_the_step_before(inspect, meas
 
 def test_the_stages_of_a_stored_step_are_those_of_its_press(inspect, tmp_path):
     _, record = inspect()
-    worker = PanelWorker()
-    pictures = PanelPictures(records_folder(tmp_path / "home"), worker)
-
-    async def again():
-        return [
-            (await pictures.stages(GetStages(sequence=1, step=point.step))).area_px for point in record.judged.curve
-        ]
-
-    try:
-        assert asyncio.run(again()) == [point.area_px for point in record.judged.curve]
-    finally:
-        worker.close()
+    folder = records_folder(tmp_path / "home")
+    again = [read_stages(folder, 1, point.step).area_px for point in record.judged.curve]
+    assert again == [point.area_px for point in record.judged.curve]
 
 
 def test_a_sound_fruit_whose_edge_was_lost_does_not_pass(inspect, measurements):

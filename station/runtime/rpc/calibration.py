@@ -30,6 +30,7 @@ from station.channel.panel_maintenance_queries import (
 )
 from station.channel.panel_queries import Picture
 from station.channel.server import Handler
+from station.channel.worker import PanelWorker
 from station.errors import BadInputError, StationError
 from station.messages import calibration as messages
 from station.messages.maintenance import UNDER_WAY
@@ -39,7 +40,6 @@ from station.records.records import Records
 from station.runtime.devices.calibration_rig import CalibrationRig
 from station.runtime.observability.audit_logger import AuditLogger, calibration_entry, verification_entry
 from station.runtime.production.production import Production
-from station.runtime.rpc.worker import PanelWorker
 from station.settings.configuration import Configuration
 from station.settings.recipe import Recipe, find_recipe
 

@@ -27,6 +27,7 @@ from station.channel.panel_maintenance_queries import (
 )
 from station.channel.panel_queries import Picture
 from station.channel.server import Handler
+from station.channel.worker import PanelWorker
 from station.devices.camera.interface import Frame, Image, Leds
 from station.errors import StationError
 from station.inspection.states import STATES, State
@@ -39,7 +40,6 @@ from station.runtime.imaging.golden_reference import GOLDEN
 from station.runtime.observability.observability import Observability
 from station.runtime.production.production import Production
 from station.runtime.rpc.log import LogRing
-from station.runtime.rpc.worker import PanelWorker
 from station.settings.segmentation import Segmentation
 from station.vision.contact import Contact, Method
 from station.vision.image_quality import sharpness

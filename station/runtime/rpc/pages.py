@@ -5,6 +5,7 @@ from typing import Self
 
 from station.channel.messages import ChannelMessage
 from station.channel.server import Handler
+from station.channel.worker import PanelWorker
 from station.records.records import Records
 from station.runtime.observability.observability import Observability
 from station.runtime.production.production import Production
@@ -13,9 +14,7 @@ from station.runtime.rpc.history import PanelHistory
 from station.runtime.rpc.jobs import PanelJobs
 from station.runtime.rpc.log import LogRing
 from station.runtime.rpc.maintenance import PanelMaintenance
-from station.runtime.rpc.pictures import PanelPictures
 from station.runtime.rpc.recipes import PanelRecipes
-from station.runtime.rpc.worker import PanelWorker
 from station.settings.configuration import Configuration
 
 
@@ -43,7 +42,6 @@ class PanelPages:
         )
         self.handlers: dict[type[ChannelMessage], Handler] = {
             **history.handlers(),
-            **PanelPictures(records.folder, self._worker).handlers(),
             **recipes.handlers(),
             **maintenance.handlers(),
             **self._ball.handlers(),

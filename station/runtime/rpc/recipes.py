@@ -34,6 +34,7 @@ from station.channel.panel_recipe_queries import (
     SubmitRecipe,
 )
 from station.channel.server import Handler
+from station.channel.worker import PanelWorker
 from station.errors import BadInputError, StationError
 from station.inspection.evidence import Evidence
 from station.inspection.press import Measured, Press
@@ -50,7 +51,6 @@ from station.recipe_store.revision import STATUS, ConflictError, Revision, Statu
 from station.recipe_store.store import RecipeStore
 from station.records.database import plain, reading, records_folder
 from station.runtime.rpc.jobs import PanelJobs
-from station.runtime.rpc.worker import PanelWorker
 from station.settings.problems import SettingsError, shortened
 from station.settings.recipe import Recipe, shipped_folder
 from station.settings.recipe_versions import content_sha256

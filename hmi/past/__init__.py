@@ -1,0 +1,1 @@
+"""History in the records, read without the station."""

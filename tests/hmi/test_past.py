@@ -1,0 +1,68 @@
+"""What happened is read by the pages' own process: also while the station is away."""
+
+import asyncio
+import json
+from pathlib import Path
+
+import pytest
+
+from hmi.web.roles import Role
+from station.records.audit import AuditEntry
+from station.records.lots import start_lot
+from station.records.model import InspectionRecord, RecipeSnapshot, Trigger
+from station.records.records import Records
+from station.settings.recipe import find_recipe
+from station.settings.records import RecordsSettings
+from tests.hmi.test_security import log_in
+
+
+@pytest.fixture
+def fruit(tmp_path: Path) -> int:
+    """A rejected fruit of a lot, in the records of a station that has ended; its number."""
+
+    async def inspected() -> int:
+        records = await Records.open(tmp_path / "records", RecordsSettings(deadline_s=20.0, free_reserve_mb=1), "boot")
+        try:
+            recipe = RecipeSnapshot.of(find_recipe("strawberry").model_dump(mode="json"))
+            trigger = Trigger(7, 1234, "A-17", 1_700_000_000_000, recipe, True)
+            sequence = await records.begin(trigger)
+            judged = InspectionRecord(
+                "FAIL", ("area_over_limit",), (), False, False, 170.0, 44_500, 4.0, 0.9, 1_700_000_003_210, 3210
+            )
+            await records.conclude(sequence, judged)
+            await records.change(lambda connection: start_lot(connection, "A-17", "Meadow Farm"))
+            await records.audit(AuditEntry("Ida", "operator", "lot.told", "lot A-17", new={"grower": "Meadow Farm"}))
+            return sequence
+        finally:
+            await records.close()
+
+    return asyncio.run(inspected())
+
+
+def test_history_lots_and_audit_trail_are_there_while_the_station_is_away(pages, fruit):
+    with pages.context.past:
+        log_in(pages, "Ana", Role.ADMIN)
+        status, _, body = pages("GET", f"/history/{fruit}")
+        assert (status, b"Contact area over the limit" in body) == (200, True)
+        status, _, body = pages("GET", "/history?lot=A-17")
+        assert (status, f"/history/{fruit}".encode() in body) == (200, True)
+        status, _, body = pages("GET", "/history/audit")
+        assert (status, b"Meadow Farm" in body) == (200, True)
+        whole = json.loads(pages("GET", f"/api/v1/inspections/{fruit}")[2])
+        assert (whole["outcome"], whole["lot"]) == ("FAIL", "A-17")
+        assert json.loads(pages("GET", "/api/v1/lots/A-17")[2])["grower"] == "Meadow Farm"
+
+
+def test_a_fruit_that_there_is_not_is_said(pages, fruit):
+    with pages.context.past:
+        log_in(pages, "Ana", Role.ADMIN)
+        status, _, body = pages("GET", f"/history/{fruit + 1}")
+        assert (status, b"no inspection" in body.lower()) == (409, True)
+        assert pages("GET", f"/api/v1/inspections/{fruit + 1}")[0] == 404
+
+
+def test_without_records_the_page_says_so(pages):
+    with pages.context.past:
+        status, _, body = pages("GET", "/history/1")
+        assert status == 409
+        assert b"records.sqlite3" in body
