@@ -44,7 +44,7 @@ _TEXT = {"text/plain": {"schema": {"type": "string"}}}
 _REFUSED: dict[int | str, dict[str, Any]] = {
     401: {"model": Error, "description": "Neither a known token nor a person who is logged in."},
     403: {"model": Error, "description": "Forbidden, or sent by a foreign page.", "content": _TEXT},
-    409: {"model": Error, "description": "The station refused; its words are the detail."},
+    409: {"model": Error, "description": "The station refused, or the records cannot be read; the detail says why."},
     413: {"description": "The request is too large.", "content": _TEXT},
     421: {"description": "The request is for a name that is not this station's.", "content": _TEXT},
     503: {"model": Error, "description": "The station gave no answer in time."},

@@ -9,6 +9,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Self
 
+import cv2
+
 from hmi.past.pictures import read_image, read_stages
 from station.channel.panel_queries import (
     AuditRowView,
@@ -22,22 +24,24 @@ from station.channel.panel_queries import (
     Search,
     Stages,
 )
-from station.channel.worker import PanelWorker
+from station.channel.worker import PanelBusyError, PanelWorker
 from station.records.audit_report import read_audit
 from station.records.database import reading
-from station.records.errors import UnknownInspectionError
-from station.records.lots import Lot, read_lots
+from station.records.errors import RecordsError, UnknownInspectionError
+from station.records.lots import read_lots
 from station.records.model import FullRecord
 from station.records.queries import Summary, read_inspection
 from station.records.search import Query, find_page
 
-__all__ = ["Past", "UnknownInspectionError"]
+__all__ = ["PanelBusyError", "Past", "RecordsError", "UnknownInspectionError"]
 
 _LONGEST_AUDIT_VALUE = 2000
 
 
 class Past:
-    """Reader of the records; each method raises `RecordsError` if they cannot be read.
+    """Reader of the records.
+
+    Each method raises `RecordsError` if they cannot be read, and `PanelBusyError` if too many wait or one takes 20 s.
 
     Args:
         folder: of the records.
@@ -47,6 +51,7 @@ class Past:
         self._folder, self._worker = folder, PanelWorker()
 
     def __enter__(self) -> Self:
+        cv2.setNumThreads(1)  # a page that measures an image must leave the other cores to the cycle
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -93,7 +98,7 @@ class Past:
 
         def read() -> tuple[LotView, ...]:
             with reading(self._folder) as connection:
-                return tuple(map(_lot, read_lots(connection, limit, name=name)))
+                return tuple(LotView(**lot._asdict()) for lot in read_lots(connection, limit, name=name))
 
         return await self._worker.do(read)
 
@@ -136,10 +141,6 @@ class Past:
 
 def _row(row: Summary) -> InspectionRow:
     return InspectionRow.model_validate({**row._asdict(), "areas_mm2": row.areas_mm2})
-
-
-def _lot(lot: Lot) -> LotView:
-    return LotView(**lot._asdict())
 
 
 def _inspection_view(record: FullRecord) -> InspectionView:

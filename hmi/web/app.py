@@ -14,7 +14,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from hmi.api.model import ApiMessage, Error
-from hmi.past.past import Past
+from hmi.past.past import PanelBusyError, Past, RecordsError
 from hmi.web.access import locale_of
 from hmi.web.assets import Assets
 from hmi.web.context import Hmi
@@ -30,7 +30,6 @@ from hmi.web.sessions import Sessions
 from hmi.web.user_store import UserStore
 from station.channel.messages import ChannelError, DeadlineError
 from station.channel.panel_live import PersonNoted
-from station.errors import StationError
 from station.messages.message import Message
 from station.settings.configuration import Configuration
 from station.settings.hmi import panel_endpoint
@@ -91,7 +90,8 @@ def make_app(hmi: Hmi) -> SecurityMiddleware:
             HTTPException: _http,
             RequestValidationError: _bad_form,
             ChannelError: _away,
-            StationError: _unread,
+            RecordsError: _unread,
+            PanelBusyError: _unread,
             Exception: _broken,
         },
     )
@@ -142,7 +142,7 @@ async def _away(request: Request, error: Exception) -> Response:
 
 async def _unread(request: Request, error: Exception) -> Response:
     """Answer that the records do not have it, or cannot be read."""
-    assert isinstance(error, StationError)  # noqa: S101 (what it is registered for)
+    assert isinstance(error, RecordsError | PanelBusyError)  # noqa: S101 (what it is registered for)
     return _problem_answer(request, 409, locale_of(request).text("problem.records"), error.message)
 
 

@@ -31,7 +31,6 @@ class JournalFile:
         """
         self._folder = folder
         self._path = folder / "journal.json"
-        self._new = folder / "journal.new"
         self.trouble: Message | None = None
         """Error of the last write."""
         try:

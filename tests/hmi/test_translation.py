@@ -14,7 +14,7 @@ from hmi.web.folders import HMI
 from hmi.web.navigation import entries, modules, parts
 from hmi.web.text import texts
 from hmi.web.translation import NO_VALUE, Locale, page_translations, preferred, translations
-from station.channel.panel_live import CurvePointSummary, Fruit, FruitSummary, LimitView, OperatorCommandName
+from station.channel.panel_live import OperatorCommandName
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import CameraError, FrameFault
 from station.devices.gripper.errors import GripperError, GripperFaultError
@@ -25,7 +25,7 @@ from station.messages import arm, camera, commands, gripper, judge, lots, outbox
 from station.messages.message import verbatim
 from station.settings.hmi import LANGUAGES
 from station.settings.recipe import load_recipes
-from station.vocabulary import Flag, OutcomeName, PackmlState, Reason
+from station.vocabulary import Flag, PackmlState, Reason
 
 STATION = HMI.parent / "station"
 NO_PAGES = {
@@ -202,41 +202,3 @@ def test_the_browsers_wish_counts_after_the_persons():
     assert preferred(("en", "de", "es"), "", "fr-FR, es-MX;q=0.9, en;q=0.8") == "es"
     assert preferred(("en", "de", "es"), "de", "es") == "de"
     assert preferred(("de", "en"), "es", "fr") == "de"
-
-
-def fruit(outcome: OutcomeName = "FAIL", areas: tuple[float, ...] = (1.0, 20.5, 60.0)) -> Fruit:
-    short = FruitSummary(
-        sequence=7,
-        outcome=outcome,
-        reasons=("area_over_limit",),
-        ended_utc_ms=1_700_000_000_000,
-        duration_ms=8000,
-        recipe="blueberry",
-        lot="<L>",
-        area_mm2=60.0,
-        closing_mm=2.0,
-        areas_mm2=areas,
-    )
-    return Fruit(
-        short=short,
-        explanation=(),
-        recipe_title="Blueberry",
-        revision="1",
-        onset_mm=15.0,
-        curve=tuple(CurvePointSummary(closing_mm=float(n), area_mm2=a, flagged=n == 0) for n, a in enumerate(areas)),
-        limits=(LimitView(closing_mm=3.0, area_mm2=45.0, least_area_mm2=10.0),),
-        early_stop_mm2=50.0,
-        growth_mm2_per_mm=20.0,
-        deadline_s=100.0,
-        phases_s={},
-        picture_step=2,
-    )
-
-
-def test_nothing_is_fetched_from_outside():
-    files = [path for path in HMI.rglob("*") if path.suffix in {".j2", ".css", ".js", ".svg"}]
-    assert len(files) == len({path.name for path in files}) > 60, "pages' files are found by their names"
-    for path in files:
-        text = path.read_text(encoding="utf-8").replace("http://www.w3.org/2000/svg", "")
-        assert not re.search(r"https?://|//[a-z]+\.", text), path
-        assert " style=" not in text, path

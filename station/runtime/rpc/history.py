@@ -21,11 +21,9 @@ from station.channel.worker import PanelWorker
 from station.errors import StationError
 from station.messages import jobs as messages
 from station.records.audit import AuditEntry
-from station.records.lots import Lot, end_lot, start_lot
+from station.records.lots import end_lot, start_lot
 from station.records.records import Records
 from station.runtime.rpc.jobs import PanelJobs
-
-_LONGEST_AUDIT_VALUE = 2000
 
 
 class PanelHistory:
@@ -55,13 +53,13 @@ class PanelHistory:
         """Store a lot's start with its audit entry."""
         lot = await self._records.change(lambda connection: start_lot(connection, request.name, request.grower))
         await self._note(request, "lot.told", {"grower": lot.grower})
-        return _lot(lot)
+        return LotView(**lot._asdict())
 
     async def end_lot(self, request: EndLot) -> LotView:
         """Store a lot's end with its audit entry."""
         lot = await self._records.change(lambda connection: end_lot(connection, request.name))
         await self._note(request, "lot.ended", {"ended_utc_ms": lot.ended_utc_ms})
-        return _lot(lot)
+        return LotView(**lot._asdict())
 
     async def start_export(self, request: StartExport) -> JobView:
         """Start an export of inspections as a table."""
@@ -92,10 +90,6 @@ class PanelHistory:
     async def _note(self, request: StartLot | EndLot | StartExport, action: str, new: object) -> None:
         subject = "records" if isinstance(request, StartExport) else f"lot {request.name}"
         await self._records.audit(AuditEntry(request.actor.who, request.actor.role, action, subject, new=new))
-
-
-def _lot(lot: Lot) -> LotView:
-    return LotView(**lot._asdict())
 
 
 def _options(search: Search) -> list[str]:
