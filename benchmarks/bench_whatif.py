@@ -16,6 +16,7 @@ import numpy as np
 
 from station.inspection.judge import early_stop, judge
 from station.inspection.press import Measured, Press
+from station.messages.records import IMAGES_NOT_WANTED
 from station.records.database import reading
 from station.records.direct_transaction import direct_transaction
 from station.records.model import CurvePoint, InspectionRecord, RecipeSnapshot, Trigger
@@ -53,7 +54,8 @@ def fill(folder: Path, recipe: Recipe, number: int) -> None:
             for sequence in range(start + 1, min(start + BATCH, number) + 1):
                 press = presses[sequence % len(presses)]
                 insert_trigger(connection, sequence, Trigger(1, 0, "A", 1, snapshot, simulated=True), "bench")
-                conclude(connection, sequence, record_of(press, recipe), {"PASS": "not wanted", "other": "not wanted"})
+                states = {"PASS": IMAGES_NOT_WANTED(), "other": IMAGES_NOT_WANTED()}
+                conclude(connection, sequence, record_of(press, recipe), states)
 
 
 def record_of(press: Press, recipe: Recipe) -> InspectionRecord:

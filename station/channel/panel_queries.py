@@ -117,7 +117,8 @@ class InspectionView(ChannelMessage):
     devices: dict[str, str]
     versions: dict[str, str]
     images: tuple[ImageView, ...]
-    images_state: str
+    images_state: Message | None
+    """None of one that runs."""
     published_utc_ms: int | None
     acknowledged_utc_ms: int | None
     fruit_length_mm: float | None = None

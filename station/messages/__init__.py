@@ -27,6 +27,7 @@ from station.messages import (
     records,
     settings,
     states,
+    supervision,
     whatif,
 )
 
@@ -57,5 +58,6 @@ __all__ = [
     "records",
     "settings",
     "states",
+    "supervision",
     "whatif",
 ]

@@ -132,18 +132,41 @@ AUDIT_TEXT = define(
 )
 
 # Images.
+IMAGES_PENDING = define("records.images_pending", "waiting for the disk")
+IMAGES_KEPT = define("records.images_kept", "kept")
+IMAGES_LOST = define("records.images_lost", "lost: the station ended before they were written")
+FILES_MISSING = define("records.files_missing", "{number} of their files are missing", number=Number(0))
+IMAGES_NOT_WANTED = define("records.images_not_wanted", "not kept, by the settings of the records")
+IMAGES_REMOVED = define("records.images_removed", "removed: space for newer ones")
+IMAGES_NONE = define("records.images_none", "none: only the outcome is known")
+IMAGES_DROPPED = define("records.images_dropped", "not stored: {cause}", cause=Nested())
+IMAGES_PARTLY = define(
+    "records.images_partly", "{state}; {kept} of {number} kept", state=Nested(), kept=Number(0), number=Number(0)
+)
+TOO_MANY_WAIT = define("records.too_many_wait", "too many images wait for the disk")
+STATION_ENDED = define("records.station_ended", "the station ended")
+OVER_QUOTA = define(
+    "records.over_quota",
+    "they need {needed_bytes} bytes, records.images_quota_mb allows {quota_bytes}",
+    needed_bytes=Number(0),
+    quota_bytes=Number(0),
+)
+QUOTA_FULL = define("records.quota_full", "the quota is full of images of rejected fruit, or on hold")
+DISK_NEARLY_FULL = define(
+    "records.disk_nearly_full", "the disk is nearly full, beside images of rejected fruit, or on hold"
+)
 REFERENCE_NOT_KEPT = define(
     "records.reference_not_kept",
     "the reference of inspection {number} was not kept ({state})",
     number=Number(0),
-    state=Name(),
+    state=Nested(),
 )
 STEP_NOT_KEPT = define(
     "records.step_not_kept",
     "the image of step {step} of inspection {number} was not kept ({state})",
     step=Number(0),
     number=Number(0),
-    state=Name(),
+    state=Nested(),
 )
 IMAGE_GONE = define("records.image_gone", "the image is not kept any more")
 IMAGE_DAMAGED = define("records.image_damaged", "the image's file is damaged")

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import Connection, Row, func, select
 
 from station.messages import records as messages
+from station.messages.message import message_in
 from station.records.database import reading
 from station.records.errors import RecordsError
 from station.records.schema import (
@@ -183,7 +184,7 @@ def _inspection(row: Row[Any], curve: list[dict[str, Any]], kept: list[dict[str,
         "published": _time(row.published_utc_ms),
         "curve": curve,
         "images": kept,
-        "images_state": row.images_state,
+        "images_state": str(message_in(row.images_state) or ""),
     }
 
 

@@ -16,6 +16,8 @@ from typing import Any, NamedTuple
 import cv2
 
 from station.atomic_file import PARTIAL, write_atomically
+from station.messages import records as messages
+from station.messages.message import Message
 from station.records.error_mapping import map_error
 from station.records.errors import RecordsError
 from station.records.model import Image
@@ -42,7 +44,15 @@ class _Set(NamedTuple):
 
 
 class _NotStoredError(Exception):
-    """An inspection's images are not stored; the message gives the reason."""
+    """An inspection's images are not stored.
+
+    Attributes:
+        message: the reason.
+    """
+
+    def __init__(self, message: Message) -> None:
+        super().__init__(str(message))
+        self.message = message
 
 
 def image_path(folder: Path, sha256: str) -> Path:
@@ -136,16 +146,17 @@ class ImageStore:
                 sha256 = hashlib.sha256(content).hexdigest()
                 self._write(image_path(self._folder, sha256), content)
                 rows.append({"kind": image.kind, "step": image.step, "sha256": sha256, "size_bytes": len(content)})
-            state, left = "kept", 0
+            state, left = messages.IMAGES_KEPT(), 0
         except _NotStoredError as error:
-            state, left = f"dropped: {error}", len(work.images) - len(rows)
+            state, left = messages.IMAGES_DROPPED(cause=error.message), len(work.images) - len(rows)
             self.results["dropped"] += left
         except Exception as error:  # noqa: BLE001 (an image must not cost the thread)
             left = len(work.images) - len(rows)
-            state = f"failed: {map_error(error, str(self._folder / FOLDER_NAME)).cause}"
+            cause = map_error(error, str(self._folder / FOLDER_NAME)).cause
+            state = messages.IMAGES_DROPPED(cause=cause)
             self.results["failed"] += left
         if left and rows:
-            state = f"{state}; {len(rows)} of {len(work.images)} kept"
+            state = messages.IMAGES_PARTLY(state=state, kept=len(rows), number=len(work.images))
         try:
             self._record(lambda connection: add_images(connection, work.sequence, rows, state))
         except (RecordsError, TimeoutError):
@@ -155,7 +166,7 @@ class ImageStore:
 
     def _go_on(self) -> None:
         if self._stopping.is_set():
-            raise _NotStoredError("the station ended")
+            raise _NotStoredError(messages.STATION_ENDED())
 
     def _write(self, path: Path, content: bytes) -> None:
         """Write one durable file; nothing is done if it exists already."""
@@ -172,13 +183,12 @@ class ImageStore:
         """
         quota_bytes = self._settings.images_quota_mb * MB
         if needed_bytes > quota_bytes:
-            raise _NotStoredError(f"they need {needed_bytes} bytes, records.images_quota_mb allows {quota_bytes}")
+            raise _NotStoredError(messages.OVER_QUOTA(needed_bytes=needed_bytes, quota_bytes=quota_bytes))
         reserve_bytes = 2 * self._settings.free_reserve_mb * MB
         while (over := self.size_bytes + needed_bytes > quota_bytes) or self._free_bytes() < reserve_bytes:
             removed = self._record(lambda connection: remove_oldest_images(connection, for_accepted=accepted))
             if removed is None:
-                whose = "the quota is full of" if over else "the disk is nearly full, beside"
-                raise _NotStoredError(f"{whose} images of rejected fruit, or on hold")
+                raise _NotStoredError(messages.QUOTA_FULL() if over else messages.DISK_NEARLY_FULL())
             freed_bytes, names = removed
             for name in names:
                 image_path(self._folder, name).unlink(missing_ok=True)

@@ -200,5 +200,5 @@ class FullRecord:
     published_utc_ms: int | None
     acknowledged_utc_ms: int | None
     images: tuple[StoredImage, ...]
-    images_state: str
-    """`kept`, `not wanted`, or the reason why none are stored."""
+    images_state: Message | None
+    """Whether its images are stored, or why not; None of one that runs."""

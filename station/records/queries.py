@@ -10,6 +10,7 @@ from sqlalchemy import Connection, func, select, true
 
 from station.channel.line import Outcome
 from station.messages import records as messages
+from station.messages.message import message_in
 from station.records.database import plain
 from station.records.errors import UnknownInspectionError
 from station.records.images import image_path
@@ -117,7 +118,7 @@ def read_inspection(connection: Connection, sequence: int, folder: Path) -> Full
             )
             for image in kept
         ),
-        images_state=row.images_state,
+        images_state=message_in(row.images_state),
     )
 
 

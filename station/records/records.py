@@ -24,7 +24,6 @@ from station.records.model import AlarmEntry, AlarmRow, FullRecord, InspectionRe
 from station.records.open import Notice, Opened, lock_folder, open_records
 from station.records.queries import read_alarm_log, read_alarms, read_inspection, read_open, read_totals
 from station.records.write_requests import (
-    PENDING,
     acknowledge,
     add_counts,
     add_event,
@@ -191,8 +190,10 @@ class Records:
         opened = self._get()
         wanted = bool(record.images) and self._settings.images_quota_mb > 0
         reserved = wanted and opened.images.reserve()
-        state = PENDING if reserved else "dropped: too many wait for the disk" if wanted else "not wanted"
-        accepted = state if accepted_is_stored(sequence, self._settings.accepted_share) else "not wanted"
+        not_wanted = messages.IMAGES_NOT_WANTED()
+        dropped = messages.IMAGES_DROPPED(cause=messages.TOO_MANY_WAIT())
+        state = messages.IMAGES_PENDING() if reserved else dropped if wanted else not_wanted
+        accepted = state if accepted_is_stored(sequence, self._settings.accepted_share) else not_wanted
         future = opened.writer.submit(
             lambda connection: conclude(connection, sequence, record, {"PASS": accepted, "other": state})
         )
@@ -203,7 +204,7 @@ class Records:
     def _hand_over(
         self,
         opened: Opened,
-        done: Future[tuple[Outcome, str | None]],
+        done: Future[tuple[Outcome, Message | None]],
         sequence: int,
         record: InspectionRecord,
         *,
@@ -212,11 +213,11 @@ class Records:
         """Queue an inspection's images once its outcome is durable."""
         failed = done.cancelled() or done.exception() is not None
         state = None if failed else done.result()[1]
-        if state == PENDING:
+        if state == messages.IMAGES_PENDING():
             accepted = record.outcome == done.result()[0].outcome == "PASS"
             opened.images.put(sequence, record.images, accepted=accepted)
             return
-        if state is not None and state.startswith("dropped"):
+        if state is not None and state.id == messages.IMAGES_DROPPED.id:
             opened.images.drop(len(record.images))
         if reserved:
             opened.images.release()

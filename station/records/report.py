@@ -61,7 +61,7 @@ def _described(record: FullRecord) -> Iterator[str]:
         yield from _recipe(trigger.recipe)
     if judged:
         yield from _judged(judged)
-    yield _field("images", record.images_state or "none")
+    yield _field("images", str(record.images_state or "none"))
     for image in record.images:
         step = "" if image.step is None else f" {image.step}"
         yield f"  {image.kind}{step}: {image.path}"

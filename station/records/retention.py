@@ -2,6 +2,7 @@
 
 from sqlalchemy import ColumnElement, Connection, delete, func, select
 
+from station.messages import records as messages
 from station.records.holds import is_held
 from station.records.schema import images, inspections
 from station.records.write_requests import add_event, add_images
@@ -29,7 +30,7 @@ def remove_oldest_images(connection: Connection, *, for_accepted: bool) -> tuple
     sizes = {row.sha256: row.size_bytes for row in rows}
     kept = connection.scalars(select(images.c.sha256).where(images.c.sha256.in_(sizes))).all()
     free = {name: size for name, size in sizes.items() if name not in kept}
-    add_images(connection, oldest, (), "removed: space for newer ones")
+    add_images(connection, oldest, (), messages.IMAGES_REMOVED())
     return sum(free.values()), list(free)
 
 
@@ -64,5 +65,5 @@ def forget_missing(connection: Connection, missing: frozenset[str]) -> None:
             lost.setdefault(row.sequence, {})[row.id] = row.sha256
     for sequence, names in lost.items():
         connection.execute(delete(images).where(columns.id.in_(names)))
-        add_images(connection, sequence, (), f"lost: {len(names)} of its files were found missing")
+        add_images(connection, sequence, (), messages.IMAGES_DROPPED(cause=messages.FILES_MISSING(number=len(names))))
         add_event(connection, "images_missing", sequence, {"sha256": list(names.values())})

@@ -11,6 +11,7 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 
 from station.channel.line import Outcome, Reason
 from station.messages import records as messages
+from station.messages.message import Message, text_of
 from station.records.errors import BadRecordError, UnknownInspectionError
 from station.records.model import AlarmEntry, AlarmRow, InspectionRecord, Trigger
 from station.records.schema import (
@@ -28,8 +29,7 @@ from station.records.search_index import index_hour, index_reasons
 from station.records.stored_message import FIRST_PRESS, JUDGEMENT, to_stored
 
 OutboxKind = Literal["inspection", "lot", "audit"]
-PENDING = "pending"
-LOST = "lost: the station ended before they were written"
+_PENDING = (text_of(messages.IMAGES_PENDING()), "pending")  # the second: of versions before messages
 
 
 def utc_ms() -> int:
@@ -79,8 +79,8 @@ def withdraw(connection: Connection, sequence: int) -> None:
 
 
 def conclude(
-    connection: Connection, sequence: int, record: InspectionRecord, images_states: Mapping[str, str]
-) -> tuple[Outcome, str | None]:
+    connection: Connection, sequence: int, record: InspectionRecord, images_states: Mapping[str, Message]
+) -> tuple[Outcome, Message | None]:
     """Store how an inspection ended, unless it is stored already.
 
     Args:
@@ -117,7 +117,7 @@ def conclude(
             measures={**record.measures, **_messages(record)},
             devices=dict(record.devices),
             versions=dict(record.versions),
-            images_state=images_state,
+            images_state=text_of(images_state),
             outcome=standing.outcome,
             standing=standing.model_dump_json(),
         )
@@ -200,7 +200,9 @@ def end_open_inspections(connection: Connection) -> list[int]:
             .values(outcome=lost.outcome, standing=lost.model_dump_json(), ended_utc_ms=lost.ended_utc_ms)
         )
         index_reasons(connection, None if row.standing is None else Outcome.model_validate_json(row.standing), lost)
-    lost_images = update(inspections).where(table.images_state == PENDING).values(images_state=LOST)
+    lost_images = (
+        update(inspections).where(table.images_state.in_(_PENDING)).values(images_state=text_of(messages.IMAGES_LOST()))
+    )
     for row in connection.execute(lost_images.returning(table.sequence, table.published_utc_ms)).all():
         if row.published_utc_ms is not None:
             queue_event(connection, "inspection", row.sequence)
@@ -230,12 +232,12 @@ def add_event(connection: Connection, name: str, sequence: int | None, details: 
     connection.execute(insert(events).values(values))
 
 
-def add_images(connection: Connection, sequence: int, rows: Sequence[Mapping[str, Any]], state: str) -> None:
+def add_images(connection: Connection, sequence: int, rows: Sequence[Mapping[str, Any]], state: Message) -> None:
     """Add rows for images whose files are durable, and the number of stored images."""
     if rows:
         connection.execute(insert(images), [{"sequence": sequence, **row} for row in rows])
     table = inspections.c
-    changed = update(inspections).where(table.sequence == sequence).values(images_state=state)
+    changed = update(inspections).where(table.sequence == sequence).values(images_state=text_of(state))
     if connection.scalar(changed.returning(table.published_utc_ms)) is not None:
         queue_event(connection, "inspection", sequence)
 
@@ -326,7 +328,7 @@ def _insert_published(connection: Connection, outcome: Outcome, boot: str) -> No
             duration_ms=outcome.duration_ms,
             fruit_length_mm_x10=outcome.fruit_length_mm_x10,
             size_class=outcome.size_class,
-            images_state="none: known by its outcome alone",
+            images_state=text_of(messages.IMAGES_NONE()),
         )
     )
     index_hour(connection, outcome.sequence, outcome.began_utc_ms)

@@ -13,6 +13,7 @@ from station.channel.server import ChannelServer
 from station.errors import StationError
 from station.inspection.states import STATES
 from station.messages.message import verbatim
+from station.messages.supervision import TASK_ENDED
 from station.outbox.lag import OutboxMonitor
 from station.outbox.status import outbox_folder, read_status
 from station.records.records import Records
@@ -182,7 +183,7 @@ class Station:
             done, _ = await asyncio.wait({asked, *needed}, return_when=asyncio.FIRST_COMPLETED)
             for task in done - {asked}:
                 task.result()
-                raise StationError(f"{task.get_name()} has ended by itself; start the station again")
+                raise StationError(TASK_ENDED(task=task.get_name()))
         finally:
             asked.cancel()
             await asyncio.gather(asked, return_exceptions=True)

@@ -20,6 +20,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from station.errors import StationError
+from station.messages import supervision as messages
+from station.messages.message import Message, verbatim
 from station.supervision.notify import PARENT_VARIABLE, SOCKET_VARIABLE, WATCHDOG_VARIABLE, notify
 from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, publish
 
@@ -99,18 +101,18 @@ class _Child:
             if self.ready and not {b"READY=1", b"WATCHDOG=1"}.isdisjoint(lines):
                 self.heard_s = time.monotonic()
 
-    def trouble(self) -> str:
-        """Return the process's fault, empty for none."""
+    def trouble(self) -> Message | None:
+        """Return the process's fault."""
         if self.process is None:
-            return "is not running"
+            return messages.NOT_RUNNING()
         if self.process.returncode is not None:
-            return f"ended with {_named(self.process.returncode)}"
+            return messages.ENDED(how=_named(self.process.returncode))
         silent_s = time.monotonic() - self.heard_s
         if not self.ready and silent_s > self.program.start_limit_s:
-            return f"was not ready after {self.program.start_limit_s:g} s"
+            return messages.NOT_READY(limit_s=self.program.start_limit_s)
         if self.ready and silent_s > self.program.watchdog_s:
-            return f"made no progress for {self.program.watchdog_s:g} s"
-        return ""
+            return messages.NO_PROGRESS(limit_s=self.program.watchdog_s)
+        return None
 
     async def stop(self, limit_s: float) -> None:
         """End the process and all its children by SIGTERM, after the limit by SIGKILL."""
@@ -193,17 +195,15 @@ class Supervisor:
                 notify("STOPPING=1")
                 await asyncio.shield(self._stop())
         if given_up := [child.program.name for child in self._children if child.given_up]:
-            raise SupervisionError(f"given up: {', '.join(given_up)}; mend the cause and start the station again")
+            raise SupervisionError(messages.ALL_GIVEN_UP(processes=[verbatim(name) for name in given_up]))
 
     async def _until(self, child: _Child, ended: asyncio.Event) -> None:
         while not child.ready and not ended.is_set():
             child.listen()
-            if child.process is not None and child.process.returncode is not None:
-                raise SupervisionError(
-                    f"the process {child.program.name} {child.trouble()} before it was ready: {child.last_output()}"
-                )
             if trouble := child.trouble():
-                raise SupervisionError(f"the process {child.program.name} {trouble}: {child.last_output()}")
+                raise SupervisionError(
+                    messages.DID_NOT_START(process=child.program.name, trouble=trouble, output=child.last_output())
+                )
             await self._poll(self._children, ended)
 
     async def _keep(self, ended: asyncio.Event) -> None:
@@ -229,7 +229,7 @@ class Supervisor:
         for child in children:
             child.listen()
 
-    async def _restart(self, child: _Child, trouble: str) -> None:
+    async def _restart(self, child: _Child, trouble: Message) -> None:
         now_s = time.monotonic()
         while child.restarts and now_s - child.restarts[0] > RESTARTS_WITHIN_S:
             child.restarts.popleft()
@@ -237,13 +237,13 @@ class Supervisor:
         if len(child.restarts) >= RESTARTS:
             child.given_up = True
             self._publish_restarts()
-            notify(f"STATUS=given up: {child.program.name}, which {trouble}; mend the cause and start again")
-            log.critical(
-                "the process %s %s, after %d restarts within %g s: it is given up; mend the cause and start again",
-                child.program.name, trouble, RESTARTS, RESTARTS_WITHIN_S,
-            )  # fmt: skip
+            given_up = messages.GIVEN_UP(
+                process=child.program.name, trouble=trouble, restarts=RESTARTS, within_s=RESTARTS_WITHIN_S
+            )
+            notify(f"STATUS={given_up}")
+            log.critical("%s", given_up)
             return
-        log.error("the process %s %s: it is started again", child.program.name, trouble)
+        log.error("%s", messages.RESTARTED(process=child.program.name, trouble=trouble))
         child.restarts.append(now_s)
         child.restarts_in_all += 1
         self._publish_restarts()

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from station.messages import records as messages
 from station.records.images import ImageStore, accepted_is_stored
 from station.records.model import Image
 
@@ -39,7 +40,7 @@ def test_a_rejected_fruits_images_are_kept_without_loss(opened, scenario, inspec
             sequence = await inspected(records, *images)
             await settled(records)
             full = await records.inspection(sequence)
-            assert full.images_state == "kept"
+            assert full.images_state == messages.IMAGES_KEPT()
             assert [(image.kind, image.step) for image in full.images] == [
                 ("reference", None),
                 ("step", 0),
@@ -63,7 +64,7 @@ def test_a_share_of_the_accepted_is_kept(opened, scenario, inspected, noise, set
             numbers = [await inspected(records, noise(), accepted=True) for _ in range(8)]
             await settled(records)
             states = [(await records.inspection(number)).images_state for number in numbers]
-            assert states == ["not wanted", "not wanted", "not wanted", "kept"] * 2
+            assert states == [*[messages.IMAGES_NOT_WANTED()] * 3, messages.IMAGES_KEPT()] * 2
 
     scenario(steps)
 
@@ -88,7 +89,7 @@ def test_beyond_the_quota_the_oldest_accepted_go_first_then_the_oldest_rejected(
                 return number
 
             async def kept():
-                return [n for n in numbers if (await records.inspection(n)).images_state == "kept"]
+                return [n for n in numbers if (await records.inspection(n)).images_state == messages.IMAGES_KEPT()]
 
             numbers = [await add(accepted=False), await add(accepted=True), await add(accepted=True)]
             assert await kept() == [1, 2, 3]
@@ -99,10 +100,10 @@ def test_beyond_the_quota_the_oldest_accepted_go_first_then_the_oldest_rejected(
             numbers.append(await add(accepted=True))
             assert await kept() == [1, 5, 6], "an accepted one pushes out no rejected one"
             last = await records.inspection(7)
-            assert last.images_state == "dropped: the quota is full of images of rejected fruit, or on hold"
+            assert last.images_state == messages.IMAGES_DROPPED(cause=messages.QUOTA_FULL())
             numbers.append(await add(accepted=False))
             assert await kept() == [5, 6, 8]
-            assert (await records.inspection(1)).images_state == "removed: space for newer ones"
+            assert (await records.inspection(1)).images_state == messages.IMAGES_REMOVED()
             files = list((records.folder / "images").glob("*/*"))
             assert len(files) == 3
             assert records.status().image_bytes == sum(file.stat().st_size for file in files)
@@ -116,10 +117,10 @@ def test_images_larger_than_the_quota_are_dropped_and_it_is_said(opened, scenari
         async with opened(images_quota_mb=1) as records:
             sequence = await inspected(records, *(noise(side_px=315) for _ in range(4)))
             await settled(records)
-            assert "images_quota_mb allows 1000000" in (await records.inspection(sequence)).images_state
+            assert "images_quota_mb allows 1000000" in str((await records.inspection(sequence)).images_state)
         async with opened(images_quota_mb=0) as records:
             sequence = await inspected(records, noise())
-            assert (await records.inspection(sequence)).images_state == "not wanted"
+            assert (await records.inspection(sequence)).images_state == messages.IMAGES_NOT_WANTED()
 
     scenario(steps)
 
@@ -140,11 +141,14 @@ def test_a_slow_disk_drops_images_and_never_holds_up_an_inspection(
         async with opened(images_queue=2) as records:
             numbers = [await inspected(records, noise()) for _ in range(4)]
             states = [(await records.inspection(number)).images_state for number in numbers]
-            assert states == ["pending", "pending", *["dropped: too many wait for the disk"] * 2]
+            assert (
+                states
+                == [messages.IMAGES_PENDING()] * 2 + [messages.IMAGES_DROPPED(cause=messages.TOO_MANY_WAIT())] * 2
+            )
             gate.set()
             await settled(records)
             states = [(await records.inspection(number)).images_state for number in numbers[:2]]
-            assert states == ["kept", "kept"]
+            assert states == [messages.IMAGES_KEPT()] * 2
             assert records.status().images == {"kept": 2, "dropped": 2}
 
     scenario(steps)
@@ -172,8 +176,9 @@ def test_a_disk_that_fills_up_among_the_images_costs_no_record(
             assert found.standing is not None
             assert found.standing.outcome == "FAIL"
             assert len(found.images) == 2
-            assert "the disk is full" in found.images_state
-            assert found.images_state.endswith("2 of 3 kept")
+            assert found.images_state.id == messages.IMAGES_PARTLY.id
+            assert messages.DISK_FULL.id in found.images_state.ids()
+            assert (found.images_state.parameters["kept"], found.images_state.parameters["number"]) == (2, 3)
             assert records.status().images == {"kept": 2, "failed": 1}
 
     scenario(steps)
@@ -184,7 +189,7 @@ def test_what_no_png_can_hold_is_said(opened, scenario, inspected, settled):
         async with opened() as records:
             sequence = await inspected(records, Image("step", 0, np.zeros((4, 4, 7), dtype=np.uint8)))
             await settled(records)
-            assert (await records.inspection(sequence)).images_state.startswith("failed: ")
+            assert (await records.inspection(sequence)).images_state.id == messages.IMAGES_DROPPED.id
             assert records.status().images == {"failed": 1}
 
     scenario(steps)
@@ -209,7 +214,7 @@ def test_a_start_removes_files_that_nothing_refers_to_and_says_which_images_were
             while any(orphan.exists() for orphan in orphans):
                 await asyncio.sleep(0.01)
             assert image.path in set(map(str, folder.glob("*/*.png")))
-            assert (await records.inspection(lost)).images_state == "lost: the station ended before they were written"
+            assert (await records.inspection(lost)).images_state == messages.IMAGES_LOST()
 
     scenario(steps)
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from station.channel.line import Reason
 from station.messages import records as messages
+from station.messages.records import IMAGES_KEPT
 from station.records.database import FILE_NAME, migrate, open_engine, reading
 from station.records.errors import RecordsError
 from station.records.lots import end_lot, read_lots, start_lot
@@ -84,7 +85,7 @@ def test_what_is_found_is_what_there_is_also_where_the_clock_stepped(inspected, 
                 insert_trigger(connection, sequence, began, "boot")
                 if end is not None:
                     record = replace(passed, outcome=end[0], reasons=end[1], curve=())
-                    conclude(connection, sequence, record, {"PASS": "", "other": ""})
+                    conclude(connection, sequence, record, {"PASS": IMAGES_KEPT(), "other": IMAGES_KEPT()})
         engine.dispose()
         with reading(folder) as connection:
             for query in queries:

@@ -70,11 +70,15 @@ def test_what_is_given_up_is_told_and_the_rest_is_not_ended_for_it(bench, until,
         for count in (1, 2):
             await until(lambda count=count: len(bench.pids("second")) == count and supervisor.ready("second"))
             os.kill(bench.pids("second")[-1], signal.SIGKILL)
-        await until(lambda: any(line.startswith("STATUS=given up: second") for line in systemd()))
+        await until(
+            lambda: any(
+                line.startswith("STATUS=the process second ended with SIGKILL, after 1 restarts") for line in systemd()
+            )
+        )
         assert "STATUS=running; second ended with SIGKILL: restart 1 since the start" in systemd()
         systemd().clear()
         await until(lambda: "WATCHDOG=1" in systemd())
         ended.set()
 
-    with pytest.raises(supervising.SupervisionError, match="given up: second"):
+    with pytest.raises(supervising.SupervisionError, match="fail again and again: second"):
         bench.run([bench.program("first"), bench.program("second")], play)
