@@ -1,5 +1,7 @@
 """Promises about the repository itself: locks, packaging, links, the run script."""
 
+import importlib.machinery
+import importlib.util
 import re
 import subprocess
 import sys
@@ -78,3 +80,34 @@ def test_the_run_script_needs_only_the_standard_library(arguments, code):
     assert done.returncode == code
     assert "./run COMMAND" in done.stdout + done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.fixture
+def run_script():
+    """The script `run` as a module."""
+    loader = importlib.machinery.SourceFileLoader("run_script", str(ROOT / "run"))
+    spec = importlib.util.spec_from_loader(loader.name, loader)
+    assert spec is not None
+    module = importlib.util.module_from_spec(spec)
+    loader.exec_module(module)
+    return module
+
+
+def test_a_python_without_packages_is_refused_before_anything_is_installed(run_script, monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(sys, "version_info", (3, 13, 0))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setattr(run_script.shutil, "which", lambda _name: None)
+    with pytest.raises(SystemExit):
+        run_script.use_a_supported_python()
+    assert "uv python install 3.12" in capsys.readouterr().err
+
+
+def test_another_python_of_the_machine_goes_on(run_script, monkeypatch):
+    started = []
+    monkeypatch.setattr(sys, "version_info", (3, 13, 0))
+    monkeypatch.setattr(run_script.shutil, "which", lambda name: sys.executable if name == "python3.11" else None)
+    monkeypatch.setattr(run_script.os, "execv", lambda *command: started.append(command) or sys.exit(0))
+    monkeypatch.setattr(sys, "argv", ["run", "demo", "--count", "3"])
+    with pytest.raises(SystemExit):
+        run_script.use_a_supported_python()
+    assert started == [(sys.executable, [sys.executable, str(ROOT / "run"), "demo", "--count", "3"])]
