@@ -16,8 +16,19 @@ from plc_interface.plc_simulator.simulator import Summary
 _ROWS = 20
 _STYLES = {Decision.PASS: "green", Decision.FAIL: "bold red"}
 _OTHERWISE = "yellow"
-_COLUMNS = ("no.", "trigger", "fruit", "area over closing", "outcome", "area mm²", "closing mm", "cycle s", "reason")
-_WIDTHS = (4, 7, 20, 17, 9, 8, 10, 7, 0)
+_COLUMNS = (
+    "no.",
+    "trigger",
+    "record",
+    "fruit",
+    "area over closing",
+    "outcome",
+    "area mm²",
+    "closing mm",
+    "cycle s",
+    "reason",
+)
+_WIDTHS = (4, 7, 6, 20, 17, 9, 8, 10, 7, 0)
 
 Sketch = Callable[[int], str]
 """Gives a result's curve as a short text for its sequence; empty where there is none."""
@@ -82,8 +93,8 @@ class LineDisplay:
             return
         table = Table(*_COLUMNS)
         for row, style in self._rows:
-            outcome = Text(row[4], style)
-            table.add_row(*row[:4], outcome, *row[5:])
+            outcome = Text(row[5], style)
+            table.add_row(*row[:5], outcome, *row[6:])
         self._live.update(Group(table, Text(f"{summary_line(self._summary)}\n{self._activity}")), refresh=True)
 
 
@@ -103,6 +114,7 @@ def _row(passage: Passage, fruit: LaidFruit, curve: str) -> tuple[str, ...]:
     return (
         str(passage.number),
         str(passage.trigger_id),
+        str(passage.sequence or ""),
         f"{fruit.kind}{' (damaged)' if fruit.damaged else ''}" or "not known",
         curve,
         str(passage.decision),

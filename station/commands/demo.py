@@ -151,7 +151,19 @@ async def _inspect(
                 running.cancel()
                 await asyncio.gather(running, return_exceptions=True)
         click.echo(summary_line(simulator.summary))
-        click.echo(f"why a fruit was diverted: STATION_HOME={site.home} ./run station records show NUMBER")
+        click.echo(_next_steps(site.home))
+
+
+def _next_steps(home: Path) -> str:
+    """Return the commands that follow a demonstration."""
+    return (
+        "next, the records of these fruit (the number is in the column `record`):\n"
+        f"  export STATION_HOME={home}\n"
+        "  ./run station records list\n"
+        "  ./run station records show NUMBER        why this fruit passed or was diverted\n"
+        "  ./run station records report DEMO lot.html\n"
+        "and docs/index.md: one guide each for operator, quality, PLC, maintenance and research"
+    )
 
 
 def _sketch(site: Configuration, sequence: int) -> str:
