@@ -7,6 +7,7 @@ tables of `docs/paper.md` and `docs/grr.md` and the pictures below `docs/paper`.
 """
 
 import argparse
+import csv
 import os
 import re
 import shutil
@@ -297,7 +298,7 @@ def draw(studies: dict[tuple[Kind, str], Study]) -> dict[str, str]:
     for kind in (*FRUITS, Kind.RUBBER_BALL):
         pair = [first(studies[kind, method], PAPER_SIZE) for method in ("paper", "robust")]
         widths = [sample.width_mm for sample in pair[0].samples]
-        number = int(np.argsort(widths)[len(widths) // 2])
+        number = pair[0].samples[np.argsort(widths)[len(widths) // 2]].number
         (folder / f"{kind}-curves.png").write_bytes(figures.cohort_curves(pair))
         (folder / f"{kind}-areas.png").write_bytes(figures.areas_at_results(pair))
         (folder / f"{kind}-sample.png").write_bytes(figures.one_curve(pair, number))
@@ -341,6 +342,19 @@ def write_tables(path: Path, tables: dict[str, str]) -> None:
     path.write_text(text, encoding="utf-8")
 
 
+def write_csv(folder: Path, document: Path) -> None:
+    """Write each table of numbers between the marks of a document as a CSV file of the mark's name."""
+    for name, content in re.findall(r"<!-- ([\w-]+) -->\n(.*?)<!-- /\1 -->", document.read_text("utf-8"), re.DOTALL):
+        rows = [
+            [cell.strip().replace("`", "") for cell in line.strip("|").split("|")]
+            for line in content.splitlines()
+            if line.startswith("|") and not line.startswith("|---")
+        ]
+        if rows and "![" not in content:
+            with (folder / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
+                csv.writer(file, lineterminator="\n").writerows(rows)
+
+
 def main() -> None:
     """Measure everything and write it down."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -372,6 +386,7 @@ def main() -> None:
         "denoising": lambda: denoising_table(arguments.images),
     }
     write_tables(DOCS / "paper.md", {**{name: make() for name, make in makers.items()}, **draw(studies)})
+    write_csv(DOCS / "paper", DOCS / "paper.md")
     write_gauge()
 
 

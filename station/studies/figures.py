@@ -30,13 +30,13 @@ def press_sheet(study: Study, number: int) -> bytes:
     """Draw one press's images: original, difference, denoised, and segmented with the true edge (cf. its Fig. 13).
 
     Args:
-        number: of the sample, from 0.
+        number: of the sample, from 1.
 
     Returns:
         A JPEG.
     """
     request = study.request
-    press = member(request.kind, request.seed, number).press()
+    press = member(request.kind, request.seed, number - 1).press()
     segmentation = segmentation_of(request.fruit, request.method)
     method = StagedMethod(make_method(press.references, segmentation))
     tracker = PressTracker(method, segmentation.robust.least_confidence)
@@ -71,17 +71,17 @@ def one_curve(studies: Sequence[Study], number: int) -> bytes:
 
     Args:
         studies: one or two of the same cohort.
-        number: of the sample, from 0.
+        number: of the sample, from 1.
 
     Returns:
         A PNG.
     """
     figure = Figure(figsize=(7.2, 3.6), layout="constrained")
     axis = figure.add_subplot()
-    truth = studies[0].samples[number]
+    truth = studies[0].samples[number - 1]
     axis.plot(truth.closings_mm, _mm2(truth.true_areas_px), color=_TRUTH, linewidth=1, linestyle="--", label="truth")
     for study, colour, marker in zip(studies, (_BAD if len(studies) > 1 else _GOOD, _GOOD), "so", strict=False):
-        sample = study.samples[number]
+        sample = study.samples[number - 1]
         name = study.request.method
         axis.plot(sample.closings_mm, _mm2(sample.areas_px), color=colour, marker=marker, markersize=4, label=name)
     _dress(axis, studies[0])

@@ -95,7 +95,7 @@ class StudyFolder:
         """Read a sample; None if it is missing or cannot be read: it is then measured again.
 
         Args:
-            number: of the sample, from 0.
+            number: of the sample, from 1.
         """
         try:
             found = SampleResult.model_validate_json(self._place(number).read_bytes())

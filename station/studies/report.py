@@ -57,7 +57,7 @@ def write_report(study: Study) -> None:
         StationError: the disk is full or the folder has become unwritable.
     """
     request = study.request
-    identity = identity_of(Task(request.fruit, request.method, request.seed, 0))
+    identity = identity_of(Task(request.fruit, request.method, request.seed, 1))
     page = (
         environment()
         .get_template("study.html.j2")
@@ -124,7 +124,7 @@ def _figures(study: Study) -> list[tuple[str, str]]:
         sample = figures.typical(study, failed=failed)
         if sample is None:
             continue
-        name = f"Sample {sample.number + 1}, {sample.width_mm:.1f} mm wide, the middle one of those that {words}"
+        name = f"Sample {sample.number}, {sample.width_mm:.1f} mm wide, the middle one of those that {words}"
         found += [
             (f"{name}: area over closing.", figures.one_curve([study], sample.number)),
             (f"{name}: its images. Red: the true edge.", figures.press_sheet(study, sample.number)),
@@ -138,7 +138,7 @@ def _samples(study: Study) -> list[dict[str, object]]:
         places = image_at(sample.closings_mm, study.result_closings_mm)
         rows.append(
             {
-                "number": sample.number + 1,
+                "number": sample.number,
                 "weight_g": sample.weight_g,
                 "length_mm": sample.length_mm,
                 "width_mm": sample.width_mm,

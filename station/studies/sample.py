@@ -20,7 +20,7 @@ class Task(NamedTuple):
     method: str
     seed: int
     number: int
-    """Of the sample, from 0."""
+    """Of the sample, from 1."""
 
 
 class SampleResult(BaseModel):
@@ -29,6 +29,7 @@ class SampleResult(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     number: int
+    """From 1, as in the paper and in all files of a study."""
     weight_g: float
     length_mm: float
     width_mm: float
@@ -52,7 +53,7 @@ def segmentation_of(fruit: str, method: str) -> Segmentation:
 def measure_sample(task: Task) -> SampleResult:
     """Render a sample's press and measure its images as the steps of one press, on one thread."""
     cv2.setNumThreads(1)
-    one = member(task.fruit, task.seed, task.number)
+    one = member(task.fruit, task.seed, task.number - 1)
     press = one.press()
     segmentation = segmentation_of(task.fruit, task.method)
     tracker = PressTracker(make_method(press.references, segmentation), segmentation.robust.least_confidence)

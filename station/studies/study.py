@@ -73,7 +73,7 @@ def run_study(request: Request, on_begin: Callable[[int], None], on_done: Callab
         BadInputError: the folder is another study's or cannot be written, or the cluster does not answer.
         StationError: a write or a worker failed; the samples measured by then are stored.
     """
-    tasks = [Task(request.fruit, request.method, request.seed, number) for number in range(request.samples)]
+    tasks = [Task(request.fruit, request.method, request.seed, number) for number in range(1, request.samples + 1)]
     folder = StudyFolder(request.out, identity_of(tasks[0]))
     results = {task.number: found for task in tasks if (found := folder.stored(task.number)) is not None}
     on_begin(len(results))
@@ -169,18 +169,31 @@ def rising(study: Study, sample: SampleResult) -> bool:
 def _curves(study: Study) -> bytes:
     text = StringIO(newline="")
     table = csv.writer(text)
-    table.writerow(("sample", "closing_mm", "area_px", "true_area_px", "area_mm2", "confidence", "flags", "failed"))
+    table.writerow(
+        (
+            "sample",
+            "closing_mm",
+            "area_px",
+            "true_area_px",
+            "area_mm2",
+            "true_area_mm2",
+            "confidence",
+            "flags",
+            "failed",
+        )
+    )
     for sample, causes in zip(study.samples, study.causes, strict=True):
         for closing_mm, area, true_area, confidence, flags in zip(
             sample.closings_mm, sample.areas_px, sample.true_areas_px, sample.confidences, sample.flags, strict=True
         ):
             table.writerow(
                 (
-                    sample.number + 1,
+                    sample.number,
                     f"{closing_mm:.3f}",
                     area,
                     true_area,
                     f"{area * MM_PER_PX**2:.3f}",
+                    f"{true_area * MM_PER_PX**2:.3f}",
                     "" if confidence is None else f"{confidence:.3f}",
                     ";".join(flags),
                     ";".join(sorted(causes)),

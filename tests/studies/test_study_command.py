@@ -1,5 +1,6 @@
 """`station study`: its files, its resuming, and what it refuses."""
 
+import csv
 import json
 import os
 import resource
@@ -20,7 +21,7 @@ from station.studies.study import Request, run_study
 
 DEADLINE_S = 280
 ARGUMENTS = ("--fruit", "blueberry", "--seed", "5", "--method", "robust")
-TASK = Task("blueberry", "robust", 5, 0)
+TASK = Task("blueberry", "robust", 5, 1)
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -50,29 +51,32 @@ def test_a_study_on_two_cores_writes_its_files(tmp_path: Path):
     assert len(summary["failed_samples"]) == summary["failures"]
     low, high = summary["failure_rate_95"]
     assert low <= summary["failure_rate"] <= high
-    assert len((out / "curves.csv").read_text().splitlines()) == 1 + 2 * 20
+    curves = list(csv.DictReader((out / "curves.csv").open()))
+    assert [row["sample"] for row in curves] == ["1"] * 20 + ["2"] * 20
+    assert set(summary["failed_samples"]) <= {1, 2}
+    assert {path.name for path in (out / "samples").iterdir()} == {"00001.json", "00002.json"}
     page = (out / "report.html").read_text()
     assert "26.7%" in page
     assert page.count("data:image/") >= 4
     assert "http" not in page
     folder = StudyFolder(out, identity_of(TASK))
-    alone = [measure_sample(TASK._replace(number=number)) for number in (0, 1)]
-    assert [folder.stored(number) for number in (0, 1)] == alone
+    alone = [measure_sample(TASK._replace(number=number)) for number in (1, 2)]
+    assert [folder.stored(number) for number in (1, 2)] == alone
 
 
 def test_what_is_stored_is_not_measured_again_and_what_is_torn_is(tmp_path: Path):
     folder = StudyFolder(tmp_path, identity_of(TASK))
     whole = measure_sample(TASK)
     folder.store(whole.model_copy(update={"weight_g": 99.0}))
-    folder.store(whole.model_copy(update={"number": 1}))
-    torn = tmp_path / "samples" / "00001.json"
+    folder.store(whole.model_copy(update={"number": 2}))
+    torn = tmp_path / "samples" / "00002.json"
     torn.write_bytes(torn.read_bytes()[:40])
     there: list[int] = []
     done = run_study(request(tmp_path, 2), there.append, lambda: there.append(1))
     assert there == [1, 1]
     assert done.samples[0].weight_g == 99.0
-    assert done.samples[1] == measure_sample(TASK._replace(number=1))
-    assert folder.stored(1) == done.samples[1]
+    assert done.samples[1] == measure_sample(TASK._replace(number=2))
+    assert folder.stored(2) == done.samples[1]
 
 
 def test_an_interrupted_study_keeps_what_it_measured(tmp_path: Path):
