@@ -51,7 +51,7 @@ def test_a_study_on_two_cores_writes_its_files(tmp_path: Path):
     assert len(summary["failed_samples"]) == summary["failures"]
     low, high = summary["failure_rate_95"]
     assert low <= summary["failure_rate"] <= high
-    curves = list(csv.DictReader((out / "curves.csv").open()))
+    curves = list(csv.DictReader((out / "curves.csv").read_text().splitlines()))
     assert [row["sample"] for row in curves] == ["1"] * 20 + ["2"] * 20
     assert set(summary["failed_samples"]) <= {1, 2}
     assert {path.name for path in (out / "samples").iterdir()} == {"00001.json", "00002.json"}
