@@ -26,6 +26,7 @@ def made_files() -> dict[str, str]:
         "structured-text/data_types.st": structured_text.data_types(),
         "structured-text/FB_FruitStation.st": structured_text.function_block(),
         "structured-text/example.st": structured_text.example(),
+        "structured-text/configuration.st": structured_text.configuration(),
     }
 
 

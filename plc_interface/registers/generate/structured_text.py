@@ -21,6 +21,12 @@ _TYPES = {
     Kind.BITS: "WORD",
     Kind.BITS32: "DWORD",
 }
+ARRAYS = {
+    "T_FruitStationRead": MORE_ALARMS.address + MORE_ALARMS.words - STATUS.address,
+    "T_FruitStationWrite": CONTROL.words,
+    "T_FruitStationLot": BY_NAME["lot"].words,
+}
+"""Words of each array type; named, because two anonymous arrays are two types for a strict compiler."""
 _PREFIXES = {"result_reasons": "reason_"}
 
 
@@ -52,12 +58,14 @@ def members(registers: tuple[Register, ...]) -> Iterator[tuple[str, str, str]]:
 
 
 def data_types() -> str:
-    """The file with the data types of status and result."""
+    """The file with the data types of status and result, and of the words read and written."""
     parts = [_head("Data types")]
     status = (*STATUS.registers, *MORE_ALARMS.registers)
     for registers, name in ((status, "ST_FruitStationStatus"), (RESULT.registers, "ST_FruitStationResult")):
         rows = [f"    {member} : {kind}; (* {comment} *)" for member, kind, comment in members(registers)]
-        parts.append("\n".join([f"TYPE {name} :", "STRUCT", *rows, "END_STRUCT", "END_TYPE", ""]))
+        parts.append("\n".join([f"TYPE {name} :", "STRUCT", *rows, "END_STRUCT;", "END_TYPE", ""]))
+    for name, words in ARRAYS.items():
+        parts.append(f"TYPE {name} : ARRAY[0..{words - 1}] OF WORD; END_TYPE\n")
     return "\n".join(parts)
 
 
@@ -69,6 +77,11 @@ def function_block() -> str:
 def example() -> str:
     """The file with the example program."""
     return _render("example.st.j2", "Example program")
+
+
+def configuration() -> str:
+    """The file with a configuration that runs the example program."""
+    return _render("configuration.st.j2", "Configuration")
 
 
 def _head(what: str) -> str:
@@ -91,7 +104,6 @@ def _render(template: str, what: str) -> str:
         head=_head(what),
         first=STATUS.address,
         last=MORE_ALARMS.address + MORE_ALARMS.words - 1,
-        reads=MORE_ALARMS.address + MORE_ALARMS.words - STATUS.address,
         writes=CONTROL.words,
         lot_words=BY_NAME["lot"].words,
         control_bits=BY_NAME["control"].bits,

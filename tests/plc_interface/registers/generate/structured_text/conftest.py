@@ -107,12 +107,8 @@ class Unit:
 
     def _declare(self, item: Any, *, constant: bool) -> None:
         spec = item.init.spec
-        if isinstance(spec, tree.ArraySpecification):
-            (span,) = spec.subranges
-            assert int(span.start.value) == 0
-            kind: Any = ArrayOf(str(spec.type.type_name), int(span.stop.value) + 1)
-        else:
-            kind = str(spec.type)
+        assert not isinstance(spec, tree.ArraySpecification), "two anonymous arrays are two types: name it"
+        kind = str(spec.type)
         for declared in item.variables:
             name = str(declared.variable.name)
             assert name not in self.kinds, f"{name} is declared twice"
@@ -208,7 +204,7 @@ class Unit:
         if isinstance(last, tree.SubscriptList):
             (subscript,) = last.subscripts
             index = self._expression(subscript)
-            return holder.kind.kind, lambda memory, value: operator.setitem(
+            return self._library.arrays[holder.kind].kind, lambda memory, value: operator.setitem(
                 holder.value(memory), index.value(memory), value
             )
         field = str(last.field.name)
@@ -227,7 +223,8 @@ class Unit:
         if isinstance(element, tree.SubscriptList):
             (subscript,) = element.subscripts
             index = self._expression(subscript)
-            return Typed(holder.kind.kind, lambda memory: holder.value(memory)[index.value(memory)])
+            element_kind = self._library.arrays[holder.kind].kind
+            return Typed(element_kind, lambda memory: holder.value(memory)[index.value(memory)])
         field = str(element.field.name)
         if holder.kind == "TON":
             assert field == "Q"
@@ -308,11 +305,20 @@ class Library:
     def __init__(self, *sources: str) -> None:
         self.now_s = 0.0
         self.structures: dict[str, dict[str, str]] = {}
+        self.arrays: dict[str, ArrayOf] = {}
         self.declared: dict[str, Any] = {}
         self.blocks: dict[str, Unit] = {}
         for source in sources:
             for item in syntax(source):
-                if isinstance(item, tree.DataTypeDeclaration):
+                if not isinstance(item, tree.DataTypeDeclaration):
+                    self.declared[str(item.name)] = item
+                elif isinstance(item.declaration, tree.ArrayTypeDeclaration):
+                    spec = item.declaration.init.spec
+                    (span,) = spec.subranges
+                    assert int(span.start.value) == 0
+                    array = ArrayOf(str(spec.type.type_name), int(span.stop.value) + 1)
+                    self.arrays[str(item.declaration.name)] = array
+                else:
                     structure = item.declaration
                     fields = [
                         (str(declared.variable.name), str(row.init.spec.type))
@@ -321,15 +327,13 @@ class Library:
                     ]
                     assert len(dict(fields)) == len(fields), "a member is declared twice"
                     self.structures[str(structure.name)] = dict(fields)
-                else:
-                    self.declared[str(item.name)] = item
 
     def unit(self, name: str) -> Unit:
         return self.blocks.setdefault(name, Unit(self, self.declared[name]))
 
     def initial(self, kind: Any) -> Any:
-        if isinstance(kind, ArrayOf):
-            return [self.initial(kind.kind)] * kind.length
+        if kind in self.arrays:
+            return [self.initial(self.arrays[kind].kind)] * self.arrays[kind].length
         if kind == "TON":
             return Ton(lambda: self.now_s)
         if kind in self.structures:

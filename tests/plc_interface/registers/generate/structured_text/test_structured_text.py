@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from plc_interface.registers.generate.structured_text import data_types, example, function_block
+from plc_interface.registers.generate.structured_text import configuration, data_types, example, function_block
 from plc_interface.registers.map import BY_NAME, GROUP_BY_NAME
 
 RESERVED = {
@@ -39,16 +39,17 @@ def test_names_differ_also_where_case_does_not_count(library):
 def test_the_block_reads_and_writes_the_maps_blocks(library):
     kinds = library.unit("FB_FruitStation").kinds
     read = [GROUP_BY_NAME[name].words for name in ("status", "result", "more_alarms")]
-    assert kinds["station"].length == sum(read)
-    assert kinds["registers"].length == GROUP_BY_NAME["control"].words
-    assert kinds["lot"].length == BY_NAME["lot"].words
+    lengths = {name: library.arrays[kinds[name]].length for name in ("station", "registers", "lot")}
+    assert lengths == {
+        "station": sum(read), "registers": GROUP_BY_NAME["control"].words, "lot": BY_NAME["lot"].words,
+    }  # fmt: skip
 
 
 def test_the_example_runs_one_fruit(library):
     program = library.unit("PRG_FruitStationExample")
     for scan in range(20):
         library.now_s += 0.01
-        received = [0] * program.kinds["received"].length
+        received = [0] * library.arrays[program.kinds["received"]].length
         received[0] = BY_NAME["status"].flags(["online", "trigger_ready"])
         received[4] = scan
         program(received=received, exchange_ok=True, line_running=True, fruit_in_place=scan > 10, line_encoder=99)
@@ -59,7 +60,7 @@ def test_the_example_runs_one_fruit(library):
     assert program["let_pass"] is False
 
 
-@pytest.mark.parametrize("text", [data_types(), function_block(), example()])
+@pytest.mark.parametrize("text", [data_types(), function_block(), example(), configuration()])
 def test_the_text_is_portable(text):
     assert text.isascii()
     assert "//" not in text
