@@ -423,7 +423,7 @@ def configured(folder: str, *, while_closing: bool = False) -> tuple[Path, Confi
         f"home: {folder}\narm: {{host: {HOST}}}\n"
         f"gripper: {{urcap: {{host: {HOST}}}, modbus_rtu: {{host: {HOST}}}}}\n"
         "camera: {twin: {port: 49310}}\nmetrics: {port: 49312}\nrecords: {free_reserve_mb: 1}\n"
-        f"service: {{patience: 10.0}}\n{own}"
+        f"service: {{patience: 10.0, inspection_deadline_s: null}}\n{own}"
     )
     configuration = load_configuration(file, {})
     calibrate_simulated_unit(configuration, "bench")

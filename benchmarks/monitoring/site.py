@@ -81,7 +81,7 @@ def demonstration(folder: Path, server: Any, fruits: int, host: str) -> Iterator
             "longest_pause_s": 0.5,
             "postgresql": {"enabled": True, "host": str(server.folder), "user": "fruit", "tls": "disable"},
         },
-        "service": {"patience": 10.0},
+        "service": {"patience": 10.0, "inspection_deadline_s": None},
     }
     file = folder / "station.yaml"
     file.write_text(json.dumps(values))

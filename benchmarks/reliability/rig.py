@@ -324,7 +324,12 @@ async def running(folder: Path, number: int, scenario: Scenario) -> AsyncIterato
         "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
         "camera": {"oldest_s": 2.0, "twin": {"port": camera}},
         "records": {"free_reserve_mb": 1},
-        "service": {"patience": 5.0, "retry_longest_s": 1.0, "uncalibrated": "allow"},
+        "service": {
+            "patience": 5.0,
+            "inspection_deadline_s": None,
+            "retry_longest_s": 1.0,
+            "uncalibrated": "allow",
+        },
     }
     file.write_text(json.dumps(values), encoding="utf-8")
     configuration = load_configuration(file, {})

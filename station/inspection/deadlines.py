@@ -1,5 +1,6 @@
 """Deadlines of each phase and of a whole inspection, from the recipe; late is a comparison of values."""
 
+from math import ceil
 from typing import NamedTuple
 
 from station.errors import BadInputError
@@ -16,6 +17,10 @@ GRACE_S = 1.0
 """Added to each: a busy machine's scheduler, and a gripper's or an arm's answer."""
 LONGEST_S = 600.0
 """What the PLC can be told."""
+OVERSHOOT_MM = 1.0
+"""From where the moving fingers met the fruit to where they stopped; 0.6 on the twin (docs/cycle-time.md)."""
+COUNT_MM = 0.4
+"""The fingers' finest step."""
 _RAMP_S = 0.2
 """Acceleration, braking and arrival of one motion of the gripper; 9 ms on the twin (docs/gripper.md), with room for
 fingers that have mass and for a slow line. Unverified on hardware."""
@@ -32,6 +37,10 @@ class Pace(NamedTuple):
     frames_per_s: float
     arm_move_s: float
     """The longest motion of the arm between two of its places; 0 on a bench without an arm."""
+    arm_way_s: float
+    """Its way from home over the place above the nest to the nest; 0 without an arm."""
+    opening_mm_s: float
+    """Speed of the jaws without a fruit."""
     stroke_mm: float
     """Width of the open jaws."""
     record_s: float
@@ -47,6 +56,8 @@ class Deadlines(NamedTuple):
     """For every state in which something is waited for."""
     inspection_s: float
     """From the accepted trigger to the durable outcome; past it the outcome is NO_RESULT."""
+    longest_path_s: float
+    """What the recipe needs where every device does as it should: no deadline of an inspection may be shorter."""
 
 
 class Late(NamedTuple):
@@ -122,28 +133,40 @@ def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
         BadInputError: the inspection would take longer than the PLC can be told.
     """
     expected_s = _expected(recipe, pace)
-    step_s = expected_s[State.MOVING] + expected_s[State.SETTLING] + expected_s[State.CAPTURING]
-    press_s = recipe.steps.number * max(step_s, pace.measure_s) + expected_s[State.MEASURING_LAST]
-    # To where the fruit was met, and as much again count by count.
-    again_s = (
-        expected_s[State.OPENING_AGAIN]
-        + expected_s[State.CENTRING]
-        + 2 * FREED_BY_MM / recipe.steps.step_mm * (step_s + pace.measure_s)
-    )
-    inspection_s = GRACE_S + INSPECTION_MARGIN * (
-        expected_s[State.RETREATING_ACCEPTED]
-        + expected_s[State.REFERENCE]
-        + expected_s[State.APPROACHING]
-        + expected_s[State.CLOSING_TO_ONSET]
-        + press_s
-        + (recipe.press.attempts - 1) * (again_s + press_s)
-        + (0.0 if recipe.press.centre_from_mm is None or not pace.arm_move_s else again_s)
-        + pace.record_s
-    )
+    longest_path_s = _longest_path_s(recipe, pace)
+    inspection_s = GRACE_S + INSPECTION_MARGIN * longest_path_s
     if inspection_s > LONGEST_S:
         raise BadInputError(TOO_LONG(recipe=recipe.name, needed_s=inspection_s, limit_s=LONGEST_S))
     phases_s = {state: GRACE_S + PHASE_MARGIN * expected_s.get(state, 0.0) for state in FAULT_OF}
-    return Deadlines(phases_s, inspection_s)
+    return Deadlines(phases_s, inspection_s, longest_path_s)
+
+
+def _longest_path_s(recipe: Recipe, pace: Pace) -> float:
+    """The time of a fruit that is centred and pressed as often as the recipe may, each time to its last limit."""
+    speed_mm_s, step_mm = recipe.gripper.speed_mm_s, recipe.steps.step_mm
+    capturing_s = recipe.imaging.frames_per_step / pace.frames_per_s
+    approach_s = max(pace.arm_way_s, pace.stroke_mm / pace.opening_mm_s) + _RAMP_S
+    expected = recipe.expected_width
+    sweep_s = (min(expected.largest_mm, pace.stroke_mm) - expected.smallest_mm + step_mm) / speed_mm_s + _RAMP_S
+    # Back to where nothing touches, then count by count with one frame each, and once more with all.
+    glances = ceil(OVERSHOOT_MM / COUNT_MM) + 1
+    onset_s = _RAMP_S + glances * (_RAMP_S + pace.measure_s) + (glances - 1) / pace.frames_per_s + capturing_s
+    limits_mm = recipe.damage.area[-1].closing_mm
+    steps = min(recipe.steps.number, ceil(limits_mm / step_mm)) if recipe.steps.stop_when_decided else None
+    step_s = max(step_mm / speed_mm_s + _RAMP_S + recipe.imaging.settle_s + capturing_s, pace.measure_s)
+    press_s = (recipe.steps.number if steps is None else steps) * step_s + 2 * pace.measure_s
+    # The jaws open beside the fruit, the sensor moves, and the jaws close again to where it was met.
+    again_s = 2 * (FREED_BY_MM / speed_mm_s + _RAMP_S) + (_CENTRING_S if pace.arm_way_s else 0.0) + onset_s
+    centrings = 0 if recipe.press.centre_from_mm is None or not pace.arm_way_s else 1
+    return (
+        approach_s
+        + recipe.imaging.reference_frames / pace.frames_per_s
+        + sweep_s
+        + onset_s
+        + press_s
+        + centrings * again_s
+        + (recipe.press.attempts - 1) * (again_s + press_s)
+    )
 
 
 def late(limits: Deadlines, state: State, in_state_s: float, since_trigger_s: float | None) -> Late | None:

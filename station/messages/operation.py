@@ -69,6 +69,14 @@ STOPPED_AT_PANEL = define("operation.stopped_at_panel", "a person stopped the st
 CALLED_OFF = define("operation.called_off", "the PLC or a person called the inspection off")
 RESET = define("operation.reset", "a person has reset the station")
 INTERNAL_FAULT = define("operation.internal_fault", "a fault of the software, see the log: {words}", words=Name())
+DEADLINE_TOO_SHORT = define(
+    "operation.deadline_too_short",
+    "recipe {recipe}: an inspection may take {needed_s} s here, but service.inspection_deadline_s is {allowed_s} s; "
+    "raise it, and the PLC's time-out with it, or use fewer steps, a shorter settle time or fewer frames",
+    recipe=Name(),
+    needed_s=Number(1),
+    allowed_s=Number(1),
+)
 INSPECTION_TOO_LONG = define(
     "operation.inspection_too_long",
     "recipe {recipe}: an inspection may take {needed_s} s here, expected at most {limit_s} s; use fewer steps, a "

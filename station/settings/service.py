@@ -77,10 +77,11 @@ class ServiceSettings(Settings):
         "only. `allow` is for a bench or a study; each record states it.",
     )
     inspection_deadline_s: float | None = setting(
-        None,
+        15.0,
         title="Inspection's deadline",
-        description="From trigger to outcome, where the line wants it sooner than the recipe's steps need at most; "
-        "what is not judged by then is NO_RESULT with the reason late. Null for the recipe's own.",
+        description="From trigger to outcome; what is not judged by then is NO_RESULT with the reason late. The PLC's "
+        "time-out has to be longer. A recipe whose longest way needs more is refused. Null for a deadline of each "
+        "recipe's own, which `patience` stretches.",
         unit="s",
         ge=1.0,
         le=600.0,

@@ -25,7 +25,8 @@ def demo(tmp_path, unused_ports, own_host):
         f"modbus: {{port: {modbus}}}\nmetrics: {{port: {metrics}}}\nhmi: {{port: {hmi}}}\n"
         f"arm: {{host: {host}, stale_after_s: 1.0, link_lost_after_s: 4.0, watchdog_hz: 0.5}}\n"
         f"gripper: {{urcap: {{host: {host}}}, modbus_rtu: {{host: {host}}}, answer_timeout_s: 2.0}}\n"
-        f"camera: {{oldest_s: 1.0, twin: {{port: {camera}}}}}\nservice: {{patience: 10.0}}\n"
+        f"camera: {{oldest_s: 1.0, twin: {{port: {camera}}}}}\n"
+        "service: {patience: 10.0, inspection_deadline_s: null}\n"
     )
     environment = {**os.environ, "STATION_HOME": str(tmp_path), "STATION_CONFIG": str(tmp_path / "station.yaml")}
 

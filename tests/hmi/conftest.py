@@ -247,7 +247,13 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
         "camera": {"oldest_s": 3.0, "twin": {"port": camera}},
         "handshake": {"station_lost_after_s": 30.0},
         "records": {"free_reserve_mb": 1},
-        "service": {"bench": True, "retry_longest_s": 0.5, "patience": 10.0, "uncalibrated": "allow"},
+        "service": {
+            "bench": True,
+            "retry_longest_s": 0.5,
+            "patience": 10.0,
+            "inspection_deadline_s": None,
+            "uncalibrated": "allow",
+        },
     }
     file = folder / "station.yaml"
     file.write_text(json.dumps(values))

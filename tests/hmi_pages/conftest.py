@@ -240,7 +240,13 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         "modbus": {"port": free_port()},
         "hmi": {"port": port, "idle_s": 3600.0},
         "records": {"free_reserve_mb": 1, "accepted_share": 1.0},
-        "service": {"bench": True, "retry_longest_s": 0.5, "patience": 10.0, "uncalibrated": "allow"},
+        "service": {
+            "bench": True,
+            "retry_longest_s": 0.5,
+            "patience": 10.0,
+            "inspection_deadline_s": None,
+            "uncalibrated": "allow",
+        },
     }
     file.write_text(json.dumps(values))
     people = UserStore(folder / "h" / "hmi")

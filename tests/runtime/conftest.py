@@ -204,7 +204,14 @@ def settings_file(tmp_path: Path) -> Callable[..., Path]:
             "camera": {"oldest_s": 3.0, "twin": {"port": free_port()}},
             "metrics": {"port": free_port()},
             "records": {"free_reserve_mb": 1},
-            "service": {"bench": True, "retry_longest_s": 0.5, "patience": 10.0, "uncalibrated": "allow", **service},
+            "service": {
+                "bench": True,
+                "retry_longest_s": 0.5,
+                "patience": 10.0,
+                "inspection_deadline_s": None,
+                "uncalibrated": "allow",
+                **service,
+            },
         }
         file = tmp_path / "station.yaml"
         file.write_text(json.dumps(values))

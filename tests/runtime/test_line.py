@@ -7,8 +7,10 @@ import pytest
 from station.channel.line import CommandName, Outcome, PackmlState
 from station.channel.messages import RefusedError
 from station.inspection.alarm_table import ALARMS, AlarmId
+from station.inspection.deadlines import deadlines
 from station.inspection.states import State
 from station.messages import readiness
+from station.runtime.cycle import pacing
 from station.vocabulary import Reason, Refusal
 
 
@@ -121,7 +123,21 @@ def test_what_the_line_tells_of_its_can_raises_its_own_alarm(bench, fault, alarm
     asyncio.run(scenario())
 
 
-def test_late_is_no_result(bench):
+def test_a_deadline_under_the_recipes_longest_way_is_refused_with_the_remedy(bench):
+    async def scenario():
+        async with bench(inspection_deadline_s=1.0) as cell:
+            with pytest.raises(AssertionError, match=r"deadline_too_short.*'allowed_s': 1\.0"):
+                await cell.choose("strawberry")
+
+    asyncio.run(scenario())
+
+
+def test_late_is_no_result(bench, monkeypatch):
+    def quick(*of):  # a cell that needs longer than its recipe lets expect
+        return deadlines(*of)._replace(longest_path_s=0.0)
+
+    monkeypatch.setattr(pacing, "deadlines", quick)
+
     async def scenario():
         async with bench(inspection_deadline_s=1.0) as cell:
             await cell.choose("strawberry")

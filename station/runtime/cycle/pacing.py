@@ -1,20 +1,22 @@
 """Cycle time budget: the deadlines of an inspection and its phases on this cell, and what is late now."""
 
 import time
-from itertools import combinations
+from itertools import combinations, pairwise
 
 from station.devices.arm.ur import POSES
+from station.errors import BadInputError
 from station.inspection.deadlines import LONGEST_S, Deadlines, Late, Pace, deadlines, late
 from station.inspection.states import State
+from station.messages.operation import DEADLINE_TOO_SHORT
 from station.runtime.cycle.inspection import Inspection
 from station.runtime.devices.rig import Cell
-from station.settings.arm import ArmSettings
+from station.settings.arm import ArmSettings, PoseName
 from station.settings.configuration import Configuration
 from station.settings.recipe import Recipe
 
 RECORD_NO_RESULT_S = 1.0
 """For a NO_RESULT to become durable, past the inspection's own deadline."""
-_MEASURE_S = 0.3
+_MEASURE_S = 0.1
 _FRAMES_PER_S = 30.0
 
 
@@ -42,23 +44,39 @@ class Pacing:
         pace = Pace(
             frames_per_s=cell.camera.description.frames_per_s or _FRAMES_PER_S,
             arm_move_s=0.0 if cell.arm is None else longest_move_s(configuration.arm),
+            arm_way_s=0.0 if cell.arm is None else way_s(configuration.arm, "home", "above_nest", "nest"),
+            opening_mm_s=configuration.gripper.opening_speed_mm_s,
             stroke_mm=cell.gripper.max_width_mm,
             record_s=configuration.records.deadline_s,
             measure_s=_MEASURE_S,
         )
         return deadlines(recipe, pace)
 
-    def limits(self, recipe: Recipe) -> Deadlines:
-        """The same with the site's patience, and its own limit of a whole inspection.
+    def check(self, recipe: Recipe) -> None:
+        """Check that the site's deadline leaves time for a recipe's longest way through the cycle.
 
         Args:
-            recipe: one that `expected` has passed.
+            recipe: one that is to become active.
+
+        Raises:
+            BadInputError: it does not, or an inspection would take longer than the PLC can be told.
+        """
+        needed_s = self.expected(recipe).longest_path_s
+        allowed_s = self._configuration.service.inspection_deadline_s
+        if allowed_s is not None and allowed_s < needed_s:
+            raise BadInputError(DEADLINE_TOO_SHORT(recipe=recipe.name, needed_s=needed_s, allowed_s=allowed_s))
+
+    def limits(self, recipe: Recipe) -> Deadlines:
+        """The same with the site's patience, and its deadline of a whole inspection.
+
+        Args:
+            recipe: one that `check` has passed.
         """
         expected, settings = self.expected(recipe), self._configuration.service
-        whole_s = min(settings.patience * expected.inspection_s, LONGEST_S - RECORD_NO_RESULT_S)
-        return Deadlines(
-            {state: settings.patience * limit_s for state, limit_s in expected.phases_s.items()},
-            min(whole_s, settings.inspection_deadline_s or whole_s),
+        own_s = min(settings.patience * expected.inspection_s, LONGEST_S - RECORD_NO_RESULT_S)
+        return expected._replace(
+            phases_s={state: settings.patience * limit_s for state, limit_s in expected.phases_s.items()},
+            inspection_s=own_s if settings.inspection_deadline_s is None else settings.inspection_deadline_s,
         )
 
 
@@ -77,11 +95,22 @@ def late_now(now: Inspection, state: State, in_state_s: float) -> Late | None:
 
 
 def longest_move_s(arm: ArmSettings) -> float:
-    """The longest way between two of the arm's places: its leading joint speeds up, travels and brakes.
+    """The longest way between two of the arm's places.
 
     Args:
         arm: poses, speed and acceleration.
     """
-    places = [arm.poses.joints_rad(pose) for pose in POSES]
-    ways_rad = [max(abs(a - b) for a, b in zip(*pair, strict=True)) for pair in combinations(places, 2)]
-    return max(ways_rad) / arm.joint_speed_rad_s + arm.joint_speed_rad_s / arm.joint_acceleration_rad_s2
+    return max(way_s(arm, *pair) for pair in combinations(POSES, 2))
+
+
+def way_s(arm: ArmSettings, *poses: PoseName) -> float:
+    """The time of a way over the arm's places, with a stop at each: its leading joint speeds up, travels and brakes.
+
+    Args:
+        arm: poses, speed and acceleration.
+        poses: at least two.
+    """
+    places = [arm.poses.joints_rad(pose) for pose in poses]
+    ways_rad = [max(abs(a - b) for a, b in zip(*pair, strict=True)) for pair in pairwise(places)]
+    ramp_s = arm.joint_speed_rad_s / arm.joint_acceleration_rad_s2
+    return sum(way_rad / arm.joint_speed_rad_s + ramp_s for way_rad in ways_rad)

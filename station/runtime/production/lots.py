@@ -37,9 +37,16 @@ class LotManager:
     def restore(self) -> None:
         """Continue the lot and the recipe of the previous start. Blocks for some milliseconds."""
         remembered = self._recipes.restored()
-        if remembered is not None:
-            active, self.lot = remembered
-            self._service.set_active(active)
+        if remembered is None:
+            return
+        try:
+            self._service.pacing.check(remembered.active.recipe)
+        except StationError as error:
+            self.mismatch = messages.NAMELESS_REFUSED(why=message_of(error))
+            log.warning("%s", self.mismatch)
+            return
+        active, self.lot = remembered
+        self._service.set_active(active)
 
     def choose(self, active: ActiveRecipe) -> bool:
         """Set the recipe of the next lot; a lot under way continues with its own.
@@ -83,7 +90,7 @@ class LotManager:
                 return active is not None
             try:
                 now = self._recipes.current(active)
-                self._service.pacing.expected(now.recipe)
+                self._service.pacing.check(now.recipe)
             except StationError as error:
                 why = message_of(error)
                 self.mismatch = messages.REFUSED(lot=lot, why=why) if lot else messages.NAMELESS_REFUSED(why=why)

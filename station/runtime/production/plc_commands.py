@@ -213,7 +213,7 @@ class PlcCommands:
         if found.recipe.expected_width.smallest_mm >= widest_mm:
             return messages.RECIPE_TOO_WIDE(number=number, widest_mm=widest_mm)
         try:
-            self._service.pacing.expected(found.recipe)
+            self._service.pacing.check(found.recipe)
         except BadInputError as error:
             return message_of(error)
         self.recipe_changing = True
