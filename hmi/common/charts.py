@@ -5,7 +5,10 @@ from collections.abc import Sequence
 from markupsafe import Markup
 
 from hmi.web.translation import Locale
-from station.charts.area_chart import Curve, Limit, Size, Texts, area_chart
+from station.charts.area_chart import Curve, Limit, Mark, Size, Texts, area_chart
+
+_SAME_MM = 0.01
+"""Closings are rounded on their way to the pages."""
 
 
 def area_over_closing(
@@ -26,5 +29,15 @@ def area_over_closing(
         early_stop_mm2: the early stop's area; None for none.
         size: of the drawing.
     """
-    texts = Texts(label, locale.text("chart.closing"), locale.text("chart.area"), locale.text("chart.early"))
+    closing, area, early, limit = (locale.text(f"chart.{name}") for name in ("closing", "area", "early", "limit"))
+    texts = Texts(label, closing, area, early, limit)
     return area_chart(curves, limits, texts, early_stop_mm2=early_stop_mm2, size=size, number=locale.number)
+
+
+def mark_decided(marks: list[Mark], points: Sequence[tuple[float, float]], closing_mm: float | None) -> None:
+    """Mark the point that decided, which has the outcome's closing, unless its own mark says more."""
+    if closing_mm is None or not points:
+        return
+    nearest = min(range(len(points)), key=lambda place: abs(points[place][0] - closing_mm))
+    if marks[nearest] == "point" and abs(points[nearest][0] - closing_mm) < _SAME_MM:
+        marks[nearest] = "decided"

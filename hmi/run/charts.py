@@ -4,19 +4,21 @@ from collections.abc import Sequence
 
 from markupsafe import Markup, escape
 
-from hmi.common.charts import area_over_closing
+from hmi.common.charts import area_over_closing, mark_decided
 from hmi.web.translation import Locale
 from station.channel.panel_live import Fruit, FruitSummary
 from station.charts.area_chart import Curve, Limit, Mark, Size
 
 TREND_BUCKET = 10
-_CURVE = Size(360, 290, 13)
+_TREND_HIGH = 52
+_CURVE = Size(540, 176, 16)
 
 
 def curve(fruit: Fruit, locale: Locale) -> Markup:
     """Draw a fruit's contact area over closing, with the recipe's limits."""
     points = [(point.closing_mm, point.area_mm2) for point in fruit.curve]
     marks: list[Mark] = ["doubtful" if point.flagged else "point" for point in fruit.curve]
+    mark_decided(marks, points, fruit.short.closing_mm)
     limits = [Limit(each.closing_mm, each.area_mm2, each.least_area_mm2) for each in fruit.limits]
     label = locale.text("run.curve_label", area=locale.number(fruit.short.area_mm2, 1), points=len(points))
     return area_over_closing([Curve("own", points, marks)], limits, locale, label, size=_CURVE)
@@ -25,10 +27,10 @@ def curve(fruit: Fruit, locale: Locale) -> Markup:
 def trend(fruit: Sequence[FruitSummary], locale: Locale) -> Markup:
     """Draw the rejects among ten fruit, ten after ten, the newest at the right: failed below, not judged above."""
     buckets = [fruit[at : at + TREND_BUCKET] for at in range(0, len(fruit) - TREND_BUCKET + 1, TREND_BUCKET)][::-1]
-    width, height, left, low = 300, 118, 46, 92
+    width, height, left, low = 340, 86, 46, 62
     parts = []
-    for share in (0.0, 0.5, 1.0):
-        at = low - share * 80
+    for share in (0.0, 1.0):
+        at = low - share * _TREND_HIGH
         parts.append(f'<path class="chart-grid" d="M{left} {at:.0f}H{width}"/>')
         parts.append(f'<text x="{left - 6}" y="{at + 4:.0f}" text-anchor="end">{escape(locale.percent(share))}</text>')
     step = (width - left) / max(8, len(buckets))
@@ -36,8 +38,9 @@ def trend(fruit: Sequence[FruitSummary], locale: Locale) -> Markup:
         failed = sum(each.outcome == "FAIL" for each in bucket) / len(bucket)
         unjudged = sum(each.outcome == "NO_RESULT" for each in bucket) / len(bucket)
         at, wide = width - (len(buckets) - number) * step + 2, step - 4
-        parts.append(_bar("bar-fail", at, low - failed * 80, wide, failed * 80))
-        parts.append(_bar("bar-unjudged", at, low - (failed + unjudged) * 80, wide, unjudged * 80))
+        parts.append(_bar("bar-fail", at, low - failed * _TREND_HIGH, wide, failed * _TREND_HIGH))
+        top = low - (failed + unjudged) * _TREND_HIGH
+        parts.append(_bar("bar-unjudged", at, top, wide, unjudged * _TREND_HIGH))
     note = locale.text("run.trend_axis", n=TREND_BUCKET)
     parts.append(f'<text x="{width}" y="{height - 6}" text-anchor="end">{escape(note)}</text>')
     rejected = [sum(each.outcome != "PASS" for each in bucket) for bucket in buckets]

@@ -3,6 +3,8 @@
 import base64
 from collections import Counter
 from collections.abc import Mapping
+from itertools import pairwise
+from statistics import median
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Form, Path, Request
@@ -21,8 +23,10 @@ from hmi.web.translation import Locale
 from station.channel.messages import RefusedError
 from station.channel.panel_live import (
     Fruit,
+    FruitSummary,
     GetFruit,
     GetPicture,
+    LimitView,
     OperatorCommand,
     OperatorCommandName,
     OperatorCommandView,
@@ -32,9 +36,12 @@ from station.charts.spark import spark
 
 router = APIRouter()
 ENTRY = Entry("run", "/")
-MOST_RECENT = 20
+MOST_RECENT = 10
+_TAKT_OF = 20
+"""So many fruit's intervals, of which the median is no pause of the line."""
 ORDER_DEADLINE_S = 5.0
 _MOST_REASONS = 3
+_LEAST_INTERVALS = 3
 _ORDERS = frozenset(
     {
         OperatorCommandName.START,
@@ -74,7 +81,7 @@ def _fruit(gateway: Gateway) -> object:
 
 
 def _fruit_values(gateway: Gateway, locale: Locale) -> Mapping[str, Any]:
-    return fruit_values(gateway.last, locale)
+    return {**fruit_values(gateway.last, locale), "on_run": True}
 
 
 def _figures(gateway: Gateway) -> object:
@@ -87,7 +94,6 @@ def _figures(gateway: Gateway) -> object:
 def _figures_values(gateway: Gateway, locale: Locale) -> Mapping[str, Any]:
     fruit = gateway.recent.fruit
     reasons = Counter(reason for each in fruit for reason in each.reasons[:1])
-    times_s = [each.duration_ms / 1000 for each in fruit[:MOST_RECENT]]
     return {
         "state": gateway.state,
         "last": gateway.last,
@@ -96,8 +102,14 @@ def _figures_values(gateway: Gateway, locale: Locale) -> Mapping[str, Any]:
         "reasons": reasons.most_common(_MOST_REASONS),
         "trend": charts.trend(fruit, locale),
         "bar": charts.bar,
-        "longest_s": max(times_s, default=None),
+        "takt_s": _takt_s(fruit[:_TAKT_OF]),
     }
+
+
+def _takt_s(fruit: tuple[FruitSummary, ...]) -> float | None:
+    """Return the line's takt: the usual time between two fruit; None for too few fruit."""
+    between_ms = [later.ended_utc_ms - earlier.ended_utc_ms for later, earlier in pairwise(fruit)]
+    return median(between_ms) / 1000 if len(between_ms) >= _LEAST_INTERVALS else None
 
 
 def _recent(gateway: Gateway) -> object:
@@ -119,7 +131,17 @@ PARTS = {
 
 def fruit_values(fruit: Fruit | None, locale: Locale) -> Mapping[str, Any]:
     """Return the values that `run_fruit.html.j2` needs for a fruit."""
-    return {"fruit": fruit, "curve": None if fruit is None else charts.curve(fruit, locale)}
+    if fruit is None:
+        return {"fruit": None}
+    return {"fruit": fruit, "limit": _deciding_limit(fruit), "curve": charts.curve(fruit, locale)}
+
+
+def _deciding_limit(fruit: Fruit) -> LimitView | None:
+    """Return the limit nearest to where the fruit was decided; None if there was no area."""
+    decided_mm = fruit.short.closing_mm
+    if decided_mm is None:
+        return None
+    return min(fruit.limits, key=lambda limit: abs(limit.closing_mm - decided_mm), default=None)
 
 
 @router.get("/")
@@ -135,7 +157,7 @@ async def fruit(request: Request, hmi: HmiNow, locale: LocaleNow, sequence: Sequ
         found = await hmi.gateway.request(GetFruit(sequence=sequence), Fruit)
     except RefusedError:
         return go_to(f"/history/{sequence}")
-    return show(request, "fruit.html.j2", **fruit_values(found, locale))
+    return show(request, "fruit.html.j2", **fruit_values(found, locale), on_run=False)
 
 
 @router.get("/fruit/{sequence}/picture.svg")

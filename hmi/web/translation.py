@@ -144,6 +144,10 @@ class Locale:
         known = page_translations(self.language).get(key)
         return english if known is None else known[0]
 
+    def title(self, title: str) -> str:
+        """Translate a shipped recipe's title; a site's own is shown as it is."""
+        return self.own(f"fruit.{title}", title)
+
     def sentence(self, said: Message | str | None) -> str:
         """Write a message in this language. A text that is not the station's is marked as English on other pages.
 

@@ -16,8 +16,8 @@ STYLE_FILE = Path(__file__).with_name("area_chart.css")
 _ROOM = 1.04
 """Beyond the largest value, so that its sign is not at the edge."""
 
-Mark = Literal["point", "doubtful", "bound", "wrong"]
-"""Sign of one point: measured, doubtful, a lower bound, or one that does not fit the others."""
+Mark = Literal["point", "decided", "doubtful", "bound", "wrong"]
+"""Sign of one point: measured, the one that decided, doubtful, a lower bound, or one that does not fit the others."""
 Kind = Literal["own", "again", "changed", "pass", "fail", "none"]
 """Of a curve: the one that the chart is about, the same measured again, its changed area, or another fruit's, by its
 outcome."""
@@ -52,6 +52,8 @@ class Texts(NamedTuple):
     closing: str = "closing, mm"
     area: str = "contact area, mm²"
     early_stop: str = "early stop"
+    limit: str = "limit"
+    """Before a limit's area, beside its sign."""
     onset: str = ""
     """Beside a line at closing 0; none if empty."""
     legend: Sequence[tuple[Kind | Mark, str]] = ()
@@ -111,8 +113,11 @@ def area_chart(
         at = y(early_stop_mm2)
         parts.append(f'<path class="early" d="M{left} {at}H{right}"/>')
         words = escape(texts.early_stop)
-        parts.append(f'<text class="limit-name" x="{right}" y="{at - 5:.1f}" text-anchor="end">{words}</text>')
+        # At the left, where areas are small: the limits' own names are at the right.
+        parts.append(f'<text class="limit-name" x="{left + text / 3:.1f}" y="{at - 5:.1f}">{words}</text>')
     parts.append(_limits(limits, x, y, text))
+    own = [point for curve in curves if curve.kind == "own" for point in curve.points]
+    parts += [_limit_name(each, own, x, y, text, f"{texts.limit} {number(each.area_mm2, 0)}") for each in limits]
     parts.append(_legend(texts.legend, left, high, text))
     whole = high + round(1.5 * text * len(texts.legend))
     return Markup(  # noqa: S704 (numbers, our own classes, and escaped texts)
@@ -161,6 +166,11 @@ def _sign(mark: str, x: float, y: float, r: float) -> str:
     match mark:
         case "bound":
             return f'<path class="mark-bound" d="M{x - r:.1f} {y + r:.1f}h{across}l{-r:.1f} {-across}z"/>'
+        case "decided":
+            return (
+                f'<circle class="mark-point" cx="{x}" cy="{y}" r="{r:.1f}"/>'
+                f'<circle class="mark-decided" cx="{x}" cy="{y}" r="{2.2 * r:.1f}"/>'
+            )
         case "wrong":
             cross = f"M{x - r:.1f} {y - r:.1f}l{across} {across}m0 {-across}l{-across} {across}"
             return f'<path class="mark-wrong" d="{cross}"/>'
@@ -190,11 +200,23 @@ def _limits(limits: Sequence[Limit], x: Axis, y: Axis, text: int) -> str:
     return "".join(parts)
 
 
+def _limit_name(limit: Limit, own: Sequence[tuple[float, float]], x: Axis, y: Axis, text: int, words: str) -> str:
+    """Write a limit's area beside its sign; nothing for a former one, whose place the present one's name needs."""
+    if limit.former:
+        return ""
+    at_x = min(x(limit.closing_mm), x(x.ticks[-1].value) - 0.3 * text * len(words))
+    nearest = min(own, key=lambda point: abs(point[0] - limit.closing_mm), default=(0.0, 0.0))
+    # Above the sign, unless the curve passes there.
+    at_y = y(limit.area_mm2) + (1.1 if nearest[1] > limit.area_mm2 else -0.75) * text
+    place = f'x="{at_x:.1f}" y="{at_y:.1f}" text-anchor="middle"'
+    return f'<text class="limit-name" {place}>{escape(words)}</text>'
+
+
 def _legend(legend: Sequence[tuple[Kind | Mark, str]], left: float, high: float, text: int) -> str:
     parts = []
     for row, (kind, words) in enumerate(legend):
         at = high + (1.5 * row + 0.7) * text
-        if kind in {"point", "doubtful", "bound", "wrong"}:
+        if kind in {"point", "decided", "doubtful", "bound", "wrong"}:
             parts.append(_sign(kind, left + 1.2 * text, at, text / 4))
         else:
             parts.append(f'<path class="curve curve-{kind}" d="M{left} {at:.1f}h{2.4 * text:.1f}"/>')

@@ -58,6 +58,18 @@ def test_limits_of_two_recipes_differ_and_the_least_area_is_drawn():
     assert higher < lower < start(shapes(chart, "limit least")[0])[1]
 
 
+@pytest.mark.parametrize(("area_mm2", "above"), [(30.0, True), (70.0, False)])
+def test_a_limit_is_named_with_its_area_where_the_curve_does_not_pass(area_mm2, above):
+    limits = [Limit(3.0, 50.4), Limit(3.0, 80.0, former=True)]
+    chart = area_chart([Curve("own", [(0.0, 0.0), (3.0, area_mm2)], ("point", "decided"))], limits, Texts("x"))
+    (name,) = shapes(chart, "limit-name")
+    assert name.text == "limit 50"
+    assert (float(name.attrib["y"]) < start(shapes(chart, "limit")[0])[1]) == above
+    (ring,) = shapes(chart, "mark-decided")
+    point = shapes(chart, "mark-point")[-1]
+    assert (ring.attrib["cx"], ring.attrib["cy"]) == (point.attrib["cx"], point.attrib["cy"])
+
+
 def test_onset_is_beside_negative_closings():
     chart = area_chart([Curve("own", [(-1.0, 0.0), (4.0, 50.0)])], (), Texts("x", onset="onset at 30 mm"))
     x = start(shapes(chart, "onset")[0])[0]

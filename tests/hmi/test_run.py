@@ -1,8 +1,41 @@
 """The run page in a real browser: the last fruit, and what stops."""
 
 from datetime import UTC, datetime, timedelta
+from math import atan, degrees
 
 import pytest
+
+MM_A_PX = 25.4 * 10.1 / (1280**2 + 800**2) ** 0.5
+CAPITALS_PX = """(selector) => [...document.querySelectorAll(selector)].map((each) => {
+  const pen = document.createElement("canvas").getContext("2d");
+  const {fontWeight, fontSize, fontFamily} = getComputedStyle(each);
+  pen.font = `${fontWeight} ${fontSize} ${fontFamily}`;
+  return pen.measureText("H").actualBoundingBoxAscent;
+})"""
+LEAST_ARC_MINUTES = {
+    ".outcome b": 20, ".why-not": 20, ".counts b": 20, ".activity-head": 16, ".decided": 16,
+}  # fmt: skip
+"""Of capital letters seen from 1 m: ISO 9241-303 asks for 16 at least, and prefers 20 to 22."""
+
+
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize("locale", ["en", "de", "es"])
+def test_the_run_page_is_read_from_one_metre_and_fits_the_panel(ready, people, panel, locale):
+    ready.twin(do="remove")
+    outcome = ready.end(ready.begin())
+    assert outcome.reasons
+    shown = panel(locale=locale)
+    shown.log_in("admin", "482915")
+    shown.open("/")
+    shown.page.locator(f".fruit-more[href='/fruit/{outcome.sequence}']").wait_for()
+    for selector, least in LEAST_ARC_MINUTES.items():
+        if selector == ".decided" and outcome.area_mm2 is None:
+            continue
+        heights_px = shown.page.evaluate(CAPITALS_PX, selector)
+        assert heights_px, selector
+        minutes = 60 * degrees(atan(min(heights_px) * MM_A_PX / 1000))
+        assert minutes >= least, f"{selector}: {minutes:.1f} minutes of arc"
+    assert shown.page.evaluate("document.documentElement.scrollHeight") <= 800
 
 
 @pytest.mark.timeout(240)
@@ -11,11 +44,11 @@ def test_a_fruit_is_shown_with_its_curve_and_its_picture(ready, panel, eventuall
     viewer.open("/")
     sequence = ready.begin()
     outcome = ready.end(sequence)
-    viewer.until(".run-fruit .facts", f"Nummer\\s*{sequence}\\b")
+    viewer.page.locator(f".fruit-more[href='/fruit/{sequence}']").wait_for()
     word = {"PASS": "i. O.", "FAIL": "n. i. O.", "NO_RESULT": "Kein Ergebnis"}[outcome.outcome]
     assert word in viewer.text(".run-fruit .outcome")
     if outcome.area_mm2 is not None:
-        assert f"{outcome.area_mm2:.1f}".replace(".", ",") in viewer.text(".run-fruit .facts")
+        assert f"{outcome.area_mm2:.1f}".replace(".", ",") in viewer.text(".run-fruit .decided")
     picture = viewer.page.locator(".fruit-picture")
     eventually(lambda: picture.evaluate("picture => picture.naturalWidth") == 480)
     drawn = viewer.context.request.get(viewer.address + picture.get_attribute("src"))
@@ -23,6 +56,7 @@ def test_a_fruit_is_shown_with_its_curve_and_its_picture(ready, panel, eventuall
     assert drawn.headers["cache-control"].startswith("private, max-age=")
     viewer.page.locator(".tile").first.click()
     viewer.until("h1", f"Frucht {sequence}")
+    viewer.until(".facts", f"Nummer\\s*{sequence}\\b")
     assert viewer.page.locator(".fruit-curve circle").count() > 1
 
 
