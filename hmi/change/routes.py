@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from starlette.responses import Response
 
 from hmi.web.access import HmiNow, LocaleNow, orders
+from hmi.web.context import Hmi
 from hmi.web.gateway import Gateway, actor_of
 from hmi.web.live import Part
 from hmi.web.navigation import Entry
@@ -66,8 +67,13 @@ PARTS = {"change.order": Part("change_order.html.j2", _order, _order_values)}
 @router.get("/change")
 async def change(request: Request, hmi: HmiNow) -> Response:
     """Show the fruit to select from."""
-    found = await hmi.gateway.request(GetRecipes(), Recipes)
-    return show(request, "change.html.j2", recipes=found.recipes, active=found.active, problems=found.problems)
+    return show(request, "change.html.j2", **await _tiles(hmi))
+
+
+@router.get("/change/part")
+async def tiles_part(hmi: HmiNow, locale: LocaleNow) -> Response:
+    """Render the same as a part, for polling: the active recipe changes while the page is open."""
+    return Response(hmi.renderer.render("change_tiles.html.j2", locale, await _tiles(hmi)), media_type="text/html")
 
 
 @router.get("/change/progress")
@@ -81,17 +87,15 @@ async def confirm(
     request: Request, hmi: HmiNow, locale: LocaleNow, number: Annotated[int, Path(ge=1, le=65_535)]
 ) -> Response:
     """Show the differences from the active recipe."""
-    found = await hmi.gateway.request(GetRecipes(), Recipes)
-    chosen = next((each for each in found.recipes if each.number == number), None)
-    if chosen is None:
-        raise Problem(404, "change.gone")
-    return show(
-        request,
-        "change_confirm.html.j2",
-        chosen=chosen,
-        active=found.active,
-        changes=changes(found.active, chosen, locale),
-    )
+    return show(request, "change_confirm.html.j2", **await _differences(hmi, locale, number))
+
+
+@router.get("/change/{number}/part")
+async def confirm_part(hmi: HmiNow, locale: LocaleNow, number: Annotated[int, Path(ge=1, le=65_535)]) -> Response:
+    """Render the differences as a part; the page reloads itself when another recipe becomes active."""
+    values = await _differences(hmi, locale, number)
+    html = hmi.renderer.render("change_what.html.j2", locale, values)
+    return Response(html, media_type="text/html", headers={"x-state": values["from_recipe"]})
 
 
 @router.post("/change")
@@ -104,6 +108,26 @@ async def carry_out(
     request = OperatorCommand(person=actor_of(caller), order=OperatorCommandName.CHOOSE_RECIPE, argument=str(number))
     await hmi.gateway.request(request, OperatorCommandView, deadline_s=ORDER_DEADLINE_S)
     return go_to("/change/progress")
+
+
+async def _tiles(hmi: Hmi) -> dict[str, Any]:
+    found = await hmi.gateway.request(GetRecipes(), Recipes)
+    fruit = [each for each in found.recipes if each.name != hmi.ball_recipe]
+    return {"recipes": fruit, "active": found.active, "problems": found.problems}
+
+
+async def _differences(hmi: Hmi, locale: Locale, number: int) -> dict[str, Any]:
+    found = await hmi.gateway.request(GetRecipes(), Recipes)
+    chosen = next((each for each in found.recipes if each.number == number), None)
+    if chosen is None:
+        raise Problem(404, "change.gone")
+    active = found.active
+    return {
+        "chosen": chosen,
+        "active": active,
+        "changes": changes(active, chosen, locale),
+        "from_recipe": "none" if active is None else f"{active.number} revision {active.revision}",
+    }
 
 
 def changes(now: RecipeSummary | None, then: RecipeSummary, locale: Locale) -> list[Change]:

@@ -21,7 +21,13 @@ from hmi.web.roles import Right
 from hmi.web.sessions import Caller
 from hmi.web.translation import Locale
 from station.channel.messages import ChannelError, RefusedError
-from station.channel.panel_live import OperatorCommand, OperatorCommandName, OperatorCommandView
+from station.channel.panel_live import (
+    GetRecipes,
+    OperatorCommand,
+    OperatorCommandName,
+    OperatorCommandView,
+    Recipes,
+)
 from station.channel.panel_maintenance_queries import (
     CalibrationRunView,
     CalibrationState,
@@ -244,7 +250,11 @@ async def _live(hmi: Hmi, *, contact: bool) -> dict[str, Any]:
 
 
 async def _calibration(hmi: Hmi) -> dict[str, Any]:
-    return {"now": await hmi.gateway.request(GetCalibration(), CalibrationState, deadline_s=DEADLINE_S)}
+    recipes = await hmi.gateway.request(GetRecipes(), Recipes)
+    return {
+        "now": await hmi.gateway.request(GetCalibration(), CalibrationState, deadline_s=DEADLINE_S),
+        "ball": next((each for each in recipes.recipes if each.name == hmi.ball_recipe), None),
+    }
 
 
 async def _registers(hmi: Hmi) -> Registers:

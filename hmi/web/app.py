@@ -60,6 +60,7 @@ def make_context(site: Configuration) -> Hmi:
         renderer=renderer,
         live=Live(parts(), renderer, gateway, boot),
         boot=boot,
+        ball_recipe=site.calibration.recipe,
     )
 
 

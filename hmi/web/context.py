@@ -27,3 +27,5 @@ class Hmi:
     renderer: Renderer
     live: Live
     boot: str
+    ball_recipe: str
+    """Name of the calibration ball's recipe, which is no fruit to choose."""
