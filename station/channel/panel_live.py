@@ -286,6 +286,8 @@ class AlarmChange(ChannelMessage):
 
     utc_ms: int
     id: str
+    number: int | None
+    """None for an alarm of another version."""
     cause: Message
     change: str
     detail: Message | None

@@ -134,16 +134,19 @@ class Housekeeping:
         alarms.update(AlarmId.CONFIGURATION_BROKEN, self._broken)
         problems = self._recipes.problems
         alarms.update(AlarmId.RECIPE_BROKEN, joined(problems) if problems else None)
-        alarms.update(
-            AlarmId.NO_RECIPE,
-            None if service.active is not None else messages.NEVER_CHOSEN(),
-        )
+        alarms.update(AlarmId.NO_RECIPE, messages.NEVER_CHOSEN() if self._recipe_missing else None)
         alarms.update(AlarmId.CALIBRATION_OLD, self._devices.calibration.alarm_detail())
         alarms.update(AlarmId.HMI_LOST, self._hmi_fault())
         alarms.update(AlarmId.OUTBOX_BEHIND, self._outbox())
         self._plc_commands.update_line_alarms()
         self._count_restarts()
         self._check_clock()
+
+    @property
+    def _recipe_missing(self) -> bool:
+        """Whether the line wants inspections and no recipe is active; before that it is a normal start."""
+        report = self._plc_commands.last_report
+        return self._service.active is None and report is not None and report.enabled
 
     def _count_restarts(self) -> None:
         many: list[Message] = []

@@ -30,7 +30,6 @@ AT_ONCE_S = 0.4
 _REMEMBERED = 8
 _RECOVERIES: dict[ArmCause, RecoveryName] = {
     ArmCause.PROTECTIVE_STOP: "protective-stop",
-    ArmCause.EMERGENCY_STOP: "power",
     ArmCause.SAFETY_FAULT: "power",
     ArmCause.NOT_POWERED: "power",
     ArmCause.SAFEGUARD_STOP: "program",
@@ -38,6 +37,8 @@ _RECOVERIES: dict[ArmCause, RecoveryName] = {
     ArmCause.PROGRAM_STOPPED: "program",
     ArmCause.REGISTERS_IN_USE: "program",
 }
+"""None for a pressed emergency stop: until it is released, nothing that a person orders here can work; then the arm is
+without power."""
 _COMMANDS = {
     OperatorCommandName.CHOOSE_RECIPE: CommandName.CHANGE_RECIPE,
     OperatorCommandName.START: CommandName.RESET,

@@ -27,7 +27,7 @@ from station.channel.panel_live import (
     RecipeSummary,
 )
 from station.channel.server import Handlers
-from station.inspection.alarm_table import ALARMS, AlarmId
+from station.inspection.alarm_table import ALARMS
 from station.inspection.states import STATES
 from station.messages import operation as messages
 from station.messages.message import Message, message_in, message_of, verbatim
@@ -46,6 +46,7 @@ from station.vocabulary import Refusal
 
 log = logging.getLogger(__name__)
 
+_ALARM_ROWS = {str(alarm): row for alarm, row in ALARMS.items()}
 SILENT_S = 3.0
 """Time for a killed HMI process to restart, on a machine that is otherwise idle."""
 
@@ -175,7 +176,8 @@ class PanelServer:
                 AlarmChange(
                     utc_ms=row.utc_ms,
                     id=row.id,
-                    cause=ALARMS[AlarmId(row.id)].cause if row.id in set(AlarmId) else verbatim(row.id),
+                    number=known.number if (known := _ALARM_ROWS.get(row.id)) else None,
+                    cause=known.cause if known else verbatim(row.id),
                     change=row.change,
                     detail=message_in(row.detail),
                 )
