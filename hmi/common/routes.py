@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Form, Query, Request
 from starlette.responses import Response, StreamingResponse
 
-from hmi.web.access import LANGUAGE_COOKIE, GenuineCaller, HmiNow, LocaleNow, caller_of
+from hmi.web.access import LANGUAGE_COOKIE, PANEL_COOKIE, GenuineCaller, HmiNow, LocaleNow, caller_of
 from hmi.web.gateway import Gateway
 from hmi.web.live import Part
 from hmi.web.page import go_to
@@ -66,6 +66,16 @@ async def live(
             hmi.live.open -= 1
 
     return StreamingResponse(stream(), media_type="text/event-stream")
+
+
+@router.get("/panel")
+async def panel(hmi: HmiNow) -> Response:
+    """Begin at a panel without a keyboard: this browser gets one on the screen. A panel's browser opens this page."""
+    answer = go_to("/")
+    answer.set_cookie(
+        PANEL_COOKIE, "1", max_age=_A_YEAR_S, secure=hmi.settings.tls.enabled, httponly=True, samesite="strict"
+    )
+    return answer
 
 
 @router.post("/here")

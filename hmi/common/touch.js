@@ -85,6 +85,13 @@
     fetch("/here", { method: "POST" }).catch(() => undefined);
   }
 
+  for (const more of document.querySelectorAll("[data-more]")) {
+    more.addEventListener("click", () => {
+      const open = more.closest("nav").classList.toggle("open");
+      more.setAttribute("aria-expanded", String(open));
+    });
+  }
+
   const wire = (root) => root.querySelectorAll("[data-hold]").forEach(holdable);
   wire(document);
   document.addEventListener("renewed", (event) => wire(event.target));

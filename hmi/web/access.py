@@ -11,7 +11,7 @@ from hmi.web.roles import Right, least_role
 from hmi.web.sessions import Caller
 from hmi.web.translation import Locale, preferred
 
-SESSION_COOKIE, LANGUAGE_COOKIE = "station_session", "station_language"
+SESSION_COOKIE, LANGUAGE_COOKIE, PANEL_COOKIE = "station_session", "station_language", "station_panel"
 TOKEN_FIELD, TOKEN_HEADER = "csrf", "x-csrf-token"
 
 

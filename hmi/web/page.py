@@ -7,7 +7,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from markupsafe import Markup
 from starlette.responses import Response
 
-from hmi.web.access import SESSION_COOKIE, caller_of, hmi_of, locale_of
+from hmi.web.access import PANEL_COOKIE, SESSION_COOKIE, caller_of, hmi_of, locale_of
 from hmi.web.context import Hmi
 from hmi.web.navigation import entries
 from hmi.web.roles import Right, Role
@@ -41,6 +41,7 @@ def show(request: Request, template: str, *, status: int = 200, **values: Any) -
         "path": request.url.path,
         "first_start": hmi.people.first_start,
         "token": lambda: hmi.sessions.token(caller.session),
+        "on_panel": PANEL_COOKIE in request.cookies,
         "live": lambda name: _live(hmi, locale, caller.role, name),
     }
     answer = HTMLResponse(hmi.renderer.render(template, locale, {**frame, **values}), status)
