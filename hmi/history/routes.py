@@ -9,7 +9,9 @@ from markupsafe import Markup
 from pydantic import StringConstraints, ValidationError
 from starlette.responses import Response
 
-from hmi.common.charts import area_over_closing
+from hmi.common.charts import area_over_closing, mark_decided
+from hmi.history.audit_sentences import sentence
+from hmi.history.chips import chips, days
 from hmi.web.access import GenuineCaller, HmiNow, LocaleNow, caller_of
 from hmi.web.context import Hmi
 from hmi.web.gateway import actor_of
@@ -29,7 +31,7 @@ from station.channel.panel_queries import (
     StartLotReport,
 )
 from station.channel.panel_recipe_queries import ListRecipes, RecipeRow, Recipes
-from station.charts.area_chart import Curve, Limit
+from station.charts.area_chart import Curve, Limit, Mark
 from station.charts.spark import spark
 from station.messages.reasons import reason_message
 from station.vocabulary import Reason
@@ -38,6 +40,7 @@ router = APIRouter(prefix="/history")
 ENTRY = Entry("history", "/history")
 DEADLINE_S = 20.0
 PAGE = 20
+_OUTCOMES = {"PASS": "pass", "FAIL": "fail", "NO_RESULT": "unjudged"}
 _KEPT_STAGES = 3
 _BETWEEN_DIGITS = str.maketrans("", "", " ,.'\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{THIN SPACE}")
 """Separators of a number such as 4,711."""
@@ -68,6 +71,7 @@ def search_of(
 async def search(
     request: Request,
     hmi: HmiNow,
+    locale: LocaleNow,
     lot: Words = "",
     grower: Words = "",
     fruit: Words = "",
@@ -83,24 +87,27 @@ async def search(
     if typed.isascii() and typed.isdigit() and 0 < int(typed) < 2**32:
         return go_to(f"/history/{int(typed)}")
     terms = {"lot": lot, "grower": grower, "fruit": fruit, "outcome": outcome, "reason": reason}
+    terms |= {"from": begun_from, "to": begun_to}
+    today = datetime.now().astimezone()
     wanted = None if typed else search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
     found = InspectionPage(rows=(), below=None)
     if wanted is not None:
         found = await hmi.past.find(wanted, PAGE, below)
-    recipes: tuple[RecipeRow, ...] = ()  # while the station is away fruit have no titles, and are found all the same
-    if hmi.gateway.fresh:
-        recipes = (await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)).rows
+    recipes = await _recipes(hmi)
     return show(
         request,
         "history.html.j2",
         status=200 if wanted is not None else 400,
-        terms={**terms, "from": begun_from, "to": begun_to},
+        terms=terms,
+        chips=chips(terms, hmi.gateway.state.lot if hmi.gateway.state is not None else None, today),
+        days=days(terms, today),
         bad=wanted is None,
         found=found,
         below=below,
-        recipes=recipes,
         titles={row.name: row.title for row in recipes},
-        reasons=tuple(Reason),
+        outcomes=[(name, locale.text(f"outcome.{key}")) for name, key in _OUTCOMES.items()],
+        fruit=[(row.name, locale.title(row.title)) for row in recipes],
+        reasons=[(reason, locale.text(f"reason.{reason}")) for reason in Reason],
         spark=spark,
         may_export=bool(caller_of(request).name),
     )
@@ -137,9 +144,12 @@ async def report(hmi: HmiNow, caller: GenuineCaller, lot: Annotated[str, Form(ma
 
 
 @router.get("/audit")
-async def audit(request: Request, hmi: HmiNow, action: Words = "", subject: Words = "") -> Response:
-    """Show the latest rows of the audit trail."""
-    rows = await hmi.past.audit(100, action, subject)
+async def audit(request: Request, hmi: HmiNow, locale: LocaleNow, action: Words = "", subject: Words = "") -> Response:
+    """Show the latest rows of the audit trail, as sentences."""
+    found = await hmi.past.audit(100, action, subject)
+    recipes = await _recipes(hmi)
+    fruit = {row.plc_number: row.title for row in recipes if row.plc_number is not None}
+    rows = [(row, sentence(row, fruit, locale)) for row in found]
     return show(request, "history_audit.html.j2", rows=rows, action=action, subject=subject)
 
 
@@ -220,6 +230,13 @@ async def _inspection(hmi: Hmi, sequence: int) -> InspectionView:
     return await hmi.past.inspection(sequence)
 
 
+async def _recipes(hmi: Hmi) -> tuple[RecipeRow, ...]:
+    """Return the recipes; none while the station is away, when fruit have no titles and are found all the same."""
+    if not hmi.gateway.fresh:
+        return ()
+    return (await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)).rows
+
+
 def _steps(reply: InspectionView) -> list[dict[str, Any]]:
     """Return every point of the curve, with its image and mask where these are stored."""
     stored = {(each.kind, each.step): each for each in reply.images if each.there}
@@ -249,7 +266,9 @@ def _chart(reply: InspectionView, locale: Locale) -> Markup | None:
     except (KeyError, TypeError):  # of a form that this program does not know
         pass
     label = locale.text("chart.fruit_label", n=reply.sequence)
-    return area_over_closing([Curve("own", points, ("point",) * len(points))], limits, locale, label, early)
+    marks: list[Mark] = ["point"] * len(points)
+    mark_decided(marks, points, reply.standing.closing_mm if reply.standing is not None else None)
+    return area_over_closing([Curve("own", points, marks)], limits, locale, label, early)
 
 
 def _utc_ms(text: str) -> int | None:

@@ -51,6 +51,33 @@ def test_a_check_that_is_due_is_said_and_led_to_before_any_fruit(pages, monkeypa
         assert ('href="/maintenance/sensor"' in text) == bool(due)
 
 
+def test_the_ball_is_not_among_the_fruit(pages, monkeypatch):
+    values = json.dumps(load_recipes()["blueberry"].model_dump(mode="json"))
+    names = ("Blueberry", 2), (pages.context.ball_recipe, 100)
+    found = tuple(RecipeSummary(number=n, name=name, title=name, revision="1", values=values) for name, n in names)
+
+    async def answer(*_, **__):
+        return Recipes(recipes=found, active=found[1], problems=())
+
+    monkeypatch.setattr(pages.context.gateway, "request", answer)
+    _, _, body = pages("GET", "/change")
+    assert "/change/2" in body.decode()
+    assert "/change/100" not in body.decode()
+
+
+@pytest.mark.timeout(240)
+def test_an_open_page_follows_a_change_that_another_made(ready, panel):
+    shown = panel()
+    shown.open("/change")
+    shown.until(".fruit-tile.active", "Blueberry")
+    other = panel()
+    other.open("/change/3")
+    other.until("table", "15 … 24|mm")
+    ready.choose("raspberry")
+    shown.until(".fruit-tile.active", "Raspberry")
+    other.until("main", "this recipe is already active")
+
+
 @pytest.mark.timeout(240)
 def test_the_fruit_is_changed_while_a_fruit_is_running(ready, operator):
     operator.open("/change")

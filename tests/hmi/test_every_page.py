@@ -76,3 +76,52 @@ def test_the_cleaning_lock_takes_no_touch_and_ends_by_itself(people, panel):
     assert viewer.page.locator("dialog").is_visible()
     assert viewer.page.evaluate("document.elementFromPoint(200, 300).closest('dialog') !== null")
     viewer.page.locator("dialog").wait_for(state="hidden")
+
+
+@pytest.mark.timeout(120)
+def test_a_panel_has_a_keyboard_on_its_screen_and_another_browser_has_none(ready, panel):
+    typist = panel(locale="de-DE")
+    for address, there in (("/", 0), ("/panel", 1)):
+        typist.open(address)
+        typist.open("/history")
+        assert typist.page.locator("[data-keyboard]").count() == there
+    typist.page.locator("summary").first.click()
+    typist.page.locator("[name=lot]").click()
+    for key in ("Großbuchstabe", "Z", "ü", "Ziffern und Zeichen, oder Buchstaben", "7", "-", "x"):
+        if key == "x":
+            typist.page.get_by_role("button", name="Ziffern und Zeichen").click()
+        typist.page.get_by_role("button", name=key, exact=True).click()
+    typist.page.get_by_role("button", name="Letztes Zeichen löschen").click()
+    assert typist.page.locator("[name=lot]").input_value() == "Zü7-"
+    heights = typist.page.locator(".keycap").evaluate_all(
+        "all => all.map((each) => each.getBoundingClientRect().height)"
+    )
+    assert min(heights) >= TARGET_PX - 1
+    assert typist.page.evaluate("""() => {
+      const [field, board] = ["[name=lot]", "[data-keyboard]"].map((each) => document.querySelector(each));
+      return field.getBoundingClientRect().bottom <= board.getBoundingClientRect().top;
+    }"""), "the field is seen above the keyboard"
+    typist.page.locator("[name=number]").click()
+    typist.page.get_by_role("button", name="4", exact=True).click()
+    assert typist.page.locator(".keyboard.digits .keycap-sign").count() == 13
+    typist.page.get_by_role("button", name="Fertig").click()
+    assert typist.page.locator("[data-keyboard]").is_hidden()
+
+
+@pytest.mark.timeout(120)
+def test_a_phones_navigation_is_one_row_with_the_rest_behind_more(ready, panel):
+    phone = panel(width=390, height=844)
+    phone.open("/maintenance")
+    nav = phone.page.locator("nav.pages")
+    row_px = nav.bounding_box()["height"]
+    assert row_px < 70
+    assert phone.page.get_by_role("link", name="People").is_hidden()
+    more = phone.page.get_by_role("button", name="More")
+    more.click()
+    assert more.get_attribute("aria-expanded") == "true"
+    phone.page.get_by_role("link", name="People").click()
+    phone.until("h1", "Log in")
+    phone.page.set_viewport_size({"width": 1280, "height": 800})
+    assert nav.get_by_role("link").count() == 7
+    assert nav.get_by_role("link", name="People").is_visible()
+    assert more.is_hidden()

@@ -18,6 +18,7 @@ OVERFLOW = "document.documentElement.scrollWidth - document.documentElement.clie
 def test_a_fruit_is_found_by_its_number_and_its_page_says_why(orchard: Any, panel: Any) -> None:
     soft = orchard.soft
     page = panel().go("/history")
+    page.get_by_text("More conditions").click()
     page.get_by_label("Fruit number").fill(str(soft.sequence))
     page.get_by_role("button", name="Search").click()
     expect(page.get_by_role("heading", name=f"Fruit {soft.sequence}")).to_be_visible()
@@ -62,10 +63,12 @@ def test_a_record_of_before_messages_is_shown_in_english_and_marked(
 
 def test_a_number_is_taken_as_people_write_it_and_one_that_is_none_is_said(orchard: Any, panel: Any) -> None:
     page = panel(locale="de").go("/history")
+    page.get_by_text("Weitere Bedingungen").click()
     page.locator("[name=number]").fill("4.711")
-    page.locator(".search .main, .search button").first.click()
+    page.locator("[role=search] .main").click()
     expect(page.locator("main")).to_contain_text("es gibt keine Prüfung 4711; aufgezeichnet sind")
     page = panel().go("/history")
+    page.get_by_text("More conditions").click()
     page.locator("[name=number]").fill("fruit 7")
     page.get_by_role("button", name="Search").click()
     expect(page.get_by_role("alert")).to_contain_text("Invalid search")
@@ -73,11 +76,23 @@ def test_a_number_is_taken_as_people_write_it_and_one_that_is_none_is_said(orcha
 
 def test_a_search_by_fruit_shows_its_inspections(orchard: Any, panel: Any) -> None:
     page = panel().go("/history")
-    page.get_by_label("Recipe").select_option("strawberry")
+    page.get_by_text("More conditions").click()
+    page.get_by_role("radio", name="Strawberry").check(force=True)
     page.get_by_role("button", name="Search").click()
     shown = [int(text) for text in page.locator(".row-number").all_inner_texts()]
     assert shown == [outcome.sequence for outcome in orchard.fruit][::-1][:20]
     assert panel().go("/history?fruit=raspberry").locator(".row-number").count() == 0
+
+
+def test_one_touch_finds_todays_rejects(orchard: Any, panel: Any) -> None:
+    page = panel().go("/history")
+    page.get_by_role("link", name="Today", exact=True).click()
+    page.get_by_role("link", name="Fail", exact=True).click()
+    shown = {int(text) for text in page.locator(".row-number").all_inner_texts()}
+    assert shown == {outcome.sequence for outcome in orchard.fruit if outcome.outcome == "FAIL"}
+    assert page.locator(".chips [aria-current]").all_inner_texts() == ["Today", "Fail"]
+    page.get_by_role("link", name="The day before").click()
+    expect(page.get_by_text("Nothing was found.")).to_be_visible()
 
 
 def test_a_search_by_reason_shows_those_and_no_others(orchard: Any, panel: Any) -> None:
@@ -85,6 +100,13 @@ def test_a_search_by_reason_shows_those_and_no_others(orchard: Any, panel: Any) 
     page = panel().go(f"/history?reason={soft.reasons[0]}")
     shown = {int(text) for text in page.locator(".row-number").all_inner_texts()}
     assert shown == {outcome.sequence for outcome in orchard.fruit if soft.reasons[0] in outcome.reasons}
+
+
+def test_the_audit_trail_is_sentences(orchard: Any, panel: Any) -> None:
+    page = panel("", locale="de").go("/history/audit")
+    expect(page.get_by_text("Hat die Frucht auf Erdbeere gewechselt.").first).to_be_visible()
+    text = page.locator("main").inner_text()
+    assert not any(sign in text for sign in ("{", "command.", "panel.", "lot.started"))
 
 
 def test_a_table_and_a_lots_report_are_written_and_fetched(orchard: Any, panel: Any) -> None:

@@ -1,0 +1,70 @@
+"""Chips and day buttons of the history page: a search by one touch, as links."""
+
+from collections.abc import Mapping
+from datetime import datetime, timedelta
+from typing import NamedTuple
+from urllib.parse import urlencode
+
+Terms = Mapping[str, str]
+"""A search, by the names of its fields; an empty text is no condition."""
+
+
+class Chip(NamedTuple):
+    """One search that a touch switches on and off."""
+
+    name: str
+    """Its text is `history.chip_NAME`."""
+    value: str
+    address: str
+    on: bool
+
+
+class Days(NamedTuple):
+    """The day that is shown, and the addresses of those beside it."""
+
+    utc_ms: int
+    before: str
+    after: str
+
+
+def chips(terms: Terms, lot: str | None, today: datetime) -> list[Chip]:
+    """Return the chips; each leaves the other conditions as they are.
+
+    Args:
+        terms: the present search.
+        lot: the current lot; None or empty for none.
+        today: local time now.
+    """
+    wanted = {
+        "today": _day(today),
+        "lot": {"lot": lot or ""},
+        "fail": {"outcome": "FAIL"},
+        "unjudged": {"outcome": "NO_RESULT"},
+    }
+    made = []
+    for name, changes in wanted.items():
+        if any(changes.values()):
+            on = all(terms[key] == value for key, value in changes.items())
+            others = dict.fromkeys(changes, "") if on else changes
+            made.append(Chip(name, lot or "", _address(terms, others), on))
+    return made
+
+
+def days(terms: Terms, today: datetime) -> Days:
+    """Return the day of the search, today where it has none, and the days beside it."""
+    try:
+        shown = datetime.fromisoformat(terms["from"])
+    except ValueError:
+        shown = today
+    before, after = (_address(terms, _day(shown + timedelta(days=step))) for step in (-1, 1))
+    return Days(round(1000 * shown.timestamp()), before, after)
+
+
+def _day(at: datetime) -> dict[str, str]:
+    begin = datetime(at.year, at.month, at.day)  # noqa: DTZ001 (local, as a browser's field has it)
+    return {"from": f"{begin:%Y-%m-%dT%H:%M}", "to": f"{begin + timedelta(days=1):%Y-%m-%dT%H:%M}"}
+
+
+def _address(terms: Terms, changes: Mapping[str, str]) -> str:
+    given = {key: value for key, value in {**terms, **changes}.items() if value}
+    return f"/history?{urlencode(given)}" if given else "/history"

@@ -1,0 +1,49 @@
+"""Rows of the audit trail as sentences: who, what, what changed, and why not."""
+
+import json
+
+import pytest
+
+from hmi.history.audit_sentences import sentence
+from hmi.web.translation import Locale
+from station.channel.panel_queries import AuditRowView
+
+FRUIT = {2: "Blueberry", 7: "Elsanta"}
+
+
+def row(action, subject="station", who="Ida", role="quality", reason="", old=None, new=None):
+    values = ("" if value is None else json.dumps(value) for value in (old, new))
+    return AuditRowView(
+        seq=1, utc_ms=1, who=who, role=role, action=action, subject=subject, reason=reason, old=next(values),
+        new=next(values),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("number", "named"), [(2, "Heidelbeere"), (7, "Elsanta"), (9, "9")])
+def test_a_change_of_fruit_names_the_fruit(number, named):
+    changed = row("command.change_recipe", who="plc", role="plc", old={"recipe": [1, "strawberry", "1"]},
+                  new={"argument": number, "done": True, "why": ""})  # fmt: skip
+    written = sentence(changed, FRUIT, Locale("de"))
+    assert written == ("SPS", f"Hat die Frucht auf {named} gewechselt.", ("recipe: 1, strawberry, 1",))
+
+
+def test_what_was_refused_says_why():
+    refused = row("command.set_mode", old={"mode": 1}, new={"argument": 3, "done": False, "why": "the arm moves"})
+    written = sentence(refused, FRUIT, Locale("en"))
+    assert written == ("Ida, Quality", "Set the mode 3.", ("Not done: the arm moves", "mode: 1"))
+
+
+def test_an_alarm_has_its_own_name_in_the_readers_language():
+    assert "Greifer" in sentence(row("alarm.shelved", "alarm gripper_link_lost"), {}, Locale("de")).what
+
+
+def test_a_changed_limit_is_shown_and_fingerprints_are_not():
+    approved = row("recipe.approved", "recipe strawberry revision 2", old={"sha256": "ab", "revision": 1},
+                   new={"sha256": "cd", "revision": 2, "changes": "area: 98 → 85"})  # fmt: skip
+    assert sentence(approved, {}, Locale("en")).what == "Approved the recipe strawberry revision 2."
+    assert sentence(approved, {}, Locale("en")).details == ("revision: 1 → 2", "changes: area: 98 → 85")
+
+
+def test_a_row_of_another_version_or_with_shortened_values_is_shown_all_the_same():
+    cut = row("press.polished", "jaws").model_copy(update={"new": '{"text": "# a rec'})
+    assert sentence(cut, {}, Locale("en")) == ("Ida, Quality", "press.polished: jaws", ())
