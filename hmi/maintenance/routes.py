@@ -56,6 +56,8 @@ ENTRY = Entry("maintenance", "/maintenance")
 DEADLINE_S = 20.0
 MOVE_DEADLINE_S = 30.0
 MODE_S = 5.0
+JOG_STEP_MM = 1.0
+LOG_LINES = 50
 _KEPT_FRAMES = 8
 _PLACE = re.compile(r"^\s*(-?\d+(?:[.,]\d+)?)\s*[; ]\s*(-?\d+(?:[.,]\d+)?)\s*$")
 
@@ -84,11 +86,19 @@ async def hand(
     at_mm: Annotated[float | None, Query(ge=-100, le=100, allow_inf_nan=False)] = None,
     lit: Annotated[Literal["yes"] | None, Query()] = None,
 ) -> Response:
-    """Show the manual control of fingers and light."""
+    """Show the manual control of fingers and light; what cannot work now is disabled, and the page says why."""
     done = locale.text("maintenance.lit") if lit else ""
     if at_mm is not None:
         done = locale.text("maintenance.jogged", width=locale.number(at_mm, 1))
-    return show(request, "maintenance_hand.html.j2", tab="hand", **await _health(hmi), done=done)
+    values = await _health(hmi)
+    return show(request, "maintenance_hand.html.j2", tab="hand", **values, allowed=_allowed(values), done=done)
+
+
+@router.get("/hand/part")
+async def hand_part(hmi: HmiNow, locale: LocaleNow) -> Response:
+    """Render the fingers' width, for polling; the page reloads itself when moving becomes allowed or refused."""
+    values = await _health(hmi)
+    return await _part(hmi, locale, "maintenance_width.html.j2", values, {"x-state": _allowed(values)})
 
 
 @router.post("/mode")
@@ -110,13 +120,19 @@ async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"
 async def jog(
     hmi: HmiNow,
     caller: Maintainer,
-    to: Annotated[Literal["open", "width", "stop"], Form()],
+    to: Annotated[Literal["open", "width", "stop", "wider", "narrower"], Form()],
     width_mm: Annotated[str, Form(max_length=12)] = "",
 ) -> Response:
     """Move the fingers, or stop them; the page shows their position, or why they do not move."""
     try:
-        width = float(width_mm.replace(",", ".")) if to == "width" else None
-        query = JogGripper(to=to, width_mm=width, actor=actor_of(caller))
+        match to:
+            case "width":
+                query = JogGripper(to=to, width_mm=float(width_mm.replace(",", ".")), actor=actor_of(caller))
+            case "wider" | "narrower":
+                width = await _stepped(hmi, JOG_STEP_MM if to == "wider" else -JOG_STEP_MM)
+                query = JogGripper(to="width", width_mm=width, actor=actor_of(caller))
+            case _:
+                query = JogGripper(to=to, actor=actor_of(caller))
     except ValueError:
         raise Problem(400, "problem.bad_form") from None
     jogged = await hmi.gateway.request(query, Jogged, deadline_s=MOVE_DEADLINE_S)
@@ -224,7 +240,7 @@ async def registers_part(hmi: HmiNow, locale: LocaleNow) -> Response:
 @router.get("/log")
 async def log(request: Request, hmi: HmiNow, level: Annotated[Level, Query()] = "INFO") -> Response:
     """Show the last lines of the station's log."""
-    reply = await hmi.gateway.request(ReadLog(limit=200, level=level), Log, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(ReadLog(limit=LOG_LINES, level=level), Log, deadline_s=DEADLINE_S)
     return show(request, "maintenance_log.html.j2", tab="log", lines=reply.lines[::-1], level=level)
 
 
@@ -234,6 +250,18 @@ _FRAMES: OrderedDict[str, Picture] = OrderedDict()
 
 async def _health(hmi: Hmi) -> dict[str, Any]:
     return {"health": await hmi.gateway.request(GetHealth(), Health, deadline_s=DEADLINE_S)}
+
+
+def _allowed(values: dict[str, Any]) -> str:
+    return "no" if values["health"].jog_refused else "yes"
+
+
+async def _stepped(hmi: Hmi, step_mm: float) -> float:
+    """Return the width a step from where the fingers are."""
+    width_mm = (await _health(hmi))["health"].width_mm
+    if width_mm is None:
+        raise Problem(409, "maintenance.width_unknown")
+    return max(0.0, round(width_mm + step_mm, 1))
 
 
 async def _live(hmi: Hmi, *, contact: bool) -> dict[str, Any]:

@@ -45,6 +45,8 @@ class Health(ChannelMessage):
     """The present activity."""
     jog_refused: Message | None
     """Why jogging is refused now, with what to do; None if it is allowed."""
+    width_mm: float | None
+    """Between the fingers, as last monitored; None during an inspection, and where the gripper does not answer."""
     parts: tuple[PartHealth, ...]
     devices: dict[str, str]
     versions: dict[str, str]

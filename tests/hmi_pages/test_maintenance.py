@@ -35,20 +35,29 @@ def test_jogging_is_refused_out_of_manual_mode_and_done_in_it(
     person = panel("Max")
     page = person.go("/maintenance/hand")
     expect(page.get_by_text("set manual mode, 3, first")).to_be_visible()
-    page.get_by_label("Width, mm").fill("40")
-    page.get_by_role("button", name="Move", exact=True).click()
-    expect(page.get_by_text("The station is in mode 1")).to_be_visible()
+    for name in ("Move", "Open", "+ 1 mm", "− 1 mm", "Set the illumination"):  # noqa: RUF001 (what is shown)
+        expect(page.get_by_role("button", name=name, exact=True)).to_be_disabled()
+    token = page.locator("input[name=csrf]").first.get_attribute("value") or ""
+    form = {"csrf": token, "to": "width", "width_mm": "40"}
+    refused = person.context.request.post(f"{person.address}/maintenance/jog", form=form)
+    assert "The station is in mode 1" in refused.text()
     eventually(lambda: [row for row in audited(orchard, "maintenance.jog") if row.who == "Max"])
     page = person.go("/maintenance/hand")
     page.get_by_role("button", name="Set manual mode").click()
     expect(page.get_by_role("button", name="Back to production")).to_be_visible()
-    page.get_by_label("Width, mm").fill("40,4")
+    page.get_by_label("To the width, mm").fill("40,4")
     page.get_by_role("button", name="Move", exact=True).click()
     told = page.get_by_text(re.compile(r"The fingers are at [\d.]+ mm"))
     expect(told).to_be_visible()
     width_mm = float(re.findall(r"[\d.]+", told.inner_text())[0])
     assert abs(width_mm - 40.4) < 0.3
     assert not orchard.state().ready
+    expect(page.locator("[data-poll] .big")).to_have_text(f"{width_mm:.1f} mm")
+    page.get_by_role("button", name="+ 1 mm").click()
+    expect(told).not_to_contain_text(f"{width_mm:.1f}")
+    wider_mm = float(re.findall(r"[\d.]+", told.inner_text())[0])
+    assert 0.5 < wider_mm - width_mm < 1.5
+    width_mm = wider_mm
     page.get_by_role("button", name="Open", exact=True).click()
     expect(told).not_to_contain_text(f"{width_mm:.1f}")
     page.get_by_role("button", name="Back to production").click()

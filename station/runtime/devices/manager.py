@@ -17,6 +17,7 @@ from station.devices.gripper.errors import (
     GripperFaultError,
     GripperNotActiveError,
 )
+from station.devices.gripper.interface import GripperReading
 from station.devices.gripper.robotiq import make_gripper
 from station.errors import StationError
 from station.messages import camera as camera_messages
@@ -38,6 +39,7 @@ _STALE_CHECKS = 3
 _ARM_PAUSE_S = 0.5
 """The driver reconnects to the arm by itself; only its state is read."""
 _OVER_TEMPERATURE = 0x8
+_OLD_WIDTH_S = 1.0
 
 
 class DeviceManager:
@@ -65,6 +67,7 @@ class DeviceManager:
             or (configuration.gripper.driver == "urcap" and configuration.gripper.urcap.host.startswith("127."))
         )
         self._confirmed_clear = False
+        self._gripper_reading: GripperReading | None = None
         self._bad_frames, self._stale_checks = 0, 0
         self._not_activated: StationError | None = None
         checks = {CAMERA: self._check_camera, GRIPPER: self._check_gripper}
@@ -147,6 +150,11 @@ class DeviceManager:
                 self.monitors[CAMERA].report_fault(fault)
             case _:
                 pass
+
+    def width_mm(self) -> float | None:
+        """Return the fingers' width as last monitored; None if that is too old, as during an inspection."""
+        reading = self._gripper_reading
+        return reading.width_mm if reading is not None and reading.age_s(time.monotonic()) < _OLD_WIDTH_S else None
 
     @property
     def active_stop(self) -> StationError | None:
@@ -262,6 +270,7 @@ class DeviceManager:
 
     async def _check_gripper(self) -> None:
         reading = await self.cell.gripper.read()
+        self._gripper_reading = reading
         if reading.fault_code in NEEDS_ACTIVATION or reading.fault_code == _OVER_TEMPERATURE:
             raise self._not_activated or GripperFaultError(reading.fault_code)
         if not reading.active:

@@ -130,6 +130,7 @@ class PanelMaintenance:
             mode=self._plc_commands.mode,
             state=STATES[self._service.state].activity,
             jog_refused=self.refusal(),
+            width_mm=self._devices.width_mm(),
             parts=tuple(
                 PartHealth(name=each.name, state=each.state, age_s=each.age_s, detail=each.detail, remedy=each.remedy)
                 for each in readiness.dependencies
