@@ -1,17 +1,19 @@
 """`station alarms` against a running station: seen, acknowledged, hidden for a time, shown again, and who did it."""
 
 import asyncio
+import time
 
 import pytest
 from click.testing import CliRunner
 
-from station.channel.line import CommandDone
+from station.channel.line import CommandDone, CommandName, Line, StationState
 from station.channel.messages import RefusedError
 from station.channel.panel import AcknowledgeAlarm, AlarmList, ListAlarms, ShelveAlarm
 from station.cli import cli
 from station.errors import StationError
 from station.inspection.alarm_table import ALARMS, AlarmId
 from station.messages import alarm_commands as messages
+from station.runtime.production import housekeeping
 
 BIT = 1 << (ALARMS[AlarmId.NO_RECIPE].number - 1)
 
@@ -40,6 +42,7 @@ def test_a_person_sees_acknowledges_and_shelves_an_alarm_and_the_trail_tells_who
             async def word():
                 return (await cell.line.state()).alarms & BIT
 
+            await cell.line.order(CommandName.RESET)
             async with asyncio.timeout(60):
                 while not await word():
                     await asyncio.sleep(0.05)
@@ -69,6 +72,28 @@ def test_a_person_sees_acknowledges_and_shelves_an_alarm_and_the_trail_tells_who
             assert "Ida" in rows
             assert "Bo" in rows
             assert told.status().failures == {}
+
+    asyncio.run(scenario())
+
+
+def test_no_recipe_is_an_alarm_only_once_the_line_wants_inspections(bench, monkeypatch):
+    monkeypatch.setattr(housekeeping, "_RECIPE_WITHIN_S", 1.0)
+
+    async def scenario():
+        async with bench() as cell:
+
+            async def word(*, enabled):
+                line = Line(plc_connected=True, plc_alive=True, enabled=enabled, waiting=0, counters={}, faults=())
+                return (await cell.line.client.request(line, StationState, deadline_s=20)).alarms & BIT
+
+            await cell.line.order(CommandName.RESET)
+            until_s = time.monotonic() + 4.0
+            while time.monotonic() < until_s:
+                assert not await word(enabled=False), "a normal start is no alarm"
+                await asyncio.sleep(0.1)
+            async with asyncio.timeout(60):
+                while not await word(enabled=True):
+                    await asyncio.sleep(0.05)
 
     asyncio.run(scenario())
 

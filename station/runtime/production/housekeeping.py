@@ -23,6 +23,8 @@ PERIOD_S = 0.2
 _ALARMS_EVERY_S = 1.0
 _BOOK_EVERY_S = 2.0
 _CLOCK_STEP_S = 2.0
+_RECIPE_WITHIN_S = 10.0
+"""The line's time to choose a recipe, before its absence is an alarm."""
 _MANY_RESTARTS, _MANY_WITHIN_S = 3, 60.0
 _MB = 1_000_000
 _AWAY = {State.UNKNOWN, State.HELD}
@@ -57,6 +59,7 @@ class Housekeeping:
         self._reserve_mb = configuration.records.free_reserve_mb
         self._longest_pause_s = configuration.service.retry_longest_s
         self._logged_ready_s = 0.0
+        self._recipe_wanted_s: float | None = None
         self._alarms_at_s = 0.0
         self._clock_offset_s = time.time() - time.monotonic()
         self._pause_s, self._again_s = PERIOD_S, 0.0
@@ -134,7 +137,7 @@ class Housekeeping:
         alarms.update(AlarmId.CONFIGURATION_BROKEN, self._broken)
         problems = self._recipes.problems
         alarms.update(AlarmId.RECIPE_BROKEN, joined(problems) if problems else None)
-        alarms.update(AlarmId.NO_RECIPE, messages.NEVER_CHOSEN() if self._recipe_missing else None)
+        alarms.update(AlarmId.NO_RECIPE, messages.NEVER_CHOSEN() if self._recipe_missing() else None)
         alarms.update(AlarmId.CALIBRATION_OLD, self._devices.calibration.alarm_detail())
         alarms.update(AlarmId.HMI_LOST, self._hmi_fault())
         alarms.update(AlarmId.OUTBOX_BEHIND, self._outbox())
@@ -142,11 +145,18 @@ class Housekeeping:
         self._count_restarts()
         self._check_clock()
 
-    @property
     def _recipe_missing(self) -> bool:
-        """Whether the line wants inspections and no recipe is active; before that it is a normal start."""
-        report = self._plc_commands.last_report
-        return self._service.active is None and report is not None and report.enabled
+        """Return whether the line has wanted inspections for a while and no recipe is active.
+
+        At a normal start the recipe comes only after the line is enabled and the devices are found healthy.
+        """
+        report, now_s = self._plc_commands.last_report, time.monotonic()
+        wanted = report is not None and report.enabled and self._service.state is State.IDLE
+        if self._service.active is not None or not wanted:
+            self._recipe_wanted_s = None
+            return False
+        self._recipe_wanted_s = now_s if self._recipe_wanted_s is None else self._recipe_wanted_s
+        return now_s - self._recipe_wanted_s > _RECIPE_WITHIN_S
 
     def _count_restarts(self) -> None:
         many: list[Message] = []
