@@ -13,6 +13,7 @@ from markupsafe import Markup, escape
 from station.charts.axis import Axis
 
 STYLE_FILE = Path(__file__).with_name("area_chart.css")
+_REPORT_STYLE = Path(__file__).with_name("report.css")
 _ROOM = 1.04
 """Beyond the largest value, so that its sign is not at the edge."""
 
@@ -70,6 +71,11 @@ class Size(NamedTuple):
 def style() -> Markup:
     """Return the chart's style sheet, for a report's own."""
     return Markup(STYLE_FILE.read_text(encoding="utf-8"))  # noqa: S704 (the project's own file)
+
+
+def report_style() -> Markup:
+    """Return the style sheet of a report in one file, with the chart's."""
+    return Markup(_REPORT_STYLE.read_text(encoding="utf-8")) + style()  # noqa: S704 (the project's own file)
 
 
 def plain(value: float, digits: int) -> str:

@@ -91,7 +91,7 @@ def _page(
     facts = [
         ("draft", f"{draft.title}, {content_sha256(draft)[:12]}"),
         ("inspections", f"{results[0].sequence} to {results[-1].sequence}{_of(lots)}"),
-        ("recipes of then", ", ".join(sha256[:12] for sha256 in own)),
+        ("recipes at the time", ", ".join(sha256[:12] for sha256 in own)),
     ]
     changes = () if single is None else differences(single, draft)
     return render(Page(f"What if: {draft.title}", facts, changes, told, against, tiles, len(changed)))

@@ -8,7 +8,8 @@ from pathlib import Path
 import cv2
 import jinja2
 
-from station.charts.area_chart import style
+from station.charts.area_chart import report_style
+from station.charts.area_histogram import area_histogram
 from station.charts.spark import spark
 from station.records.lot_summary import Example, LotSummary
 from station.records.write_requests import utc_ms
@@ -51,10 +52,10 @@ def html_report(lot: LotSummary, station: str) -> str:
         lot=lot,
         station=station,
         examples=examples,
-        tallest=max((passed + failed for _, passed, failed in lot.areas), default=0),
+        histogram=area_histogram(lot.areas, lot.limits),
         made_utc_ms=utc_ms(),
         version=version("fruit-station"),
-        chart_style=style(),
+        report_style=report_style(),
     )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from station.charts.area_histogram import Bin
 from station.messages import records as messages
 from station.messages.reasons import reason_message
 from station.records.database import plain, reading
@@ -51,8 +52,12 @@ class LotSummary:
     """Name, revision, SHA-256, inspections."""
     slices: tuple[tuple[int, int, int], ...]
     """PASS, FAIL, NO_RESULT in equal parts of the lot, in order of number."""
-    areas: tuple[tuple[float, int, int], ...]
-    """The deciding areas: upper bound in mm², PASS and FAIL below it and above the one before."""
+    areas: tuple[Bin, ...]
+    """The deciding areas of all fruit that have one."""
+    limits: tuple[tuple[float, float], ...]
+    """Closing in mm and area in mm² of the most used recipe's limits."""
+    sized: bool
+    """That recipe's limits go with the fruit's length; those above are for its reference length."""
     mean_duration_s: float | None
     simulated: int
     late: int
@@ -63,6 +68,16 @@ class LotSummary:
     def total(self) -> int:
         """Return the number of inspections with an outcome."""
         return sum(self.outcomes.values())
+
+    @property
+    def not_accepted(self) -> int:
+        """Return the number of inspections that are no PASS."""
+        return self.total - self.outcomes["PASS"]
+
+    @property
+    def measured(self) -> int:
+        """Return the number of inspections with a deciding area."""
+        return sum(sum(counts) for _, *counts in self.areas)
 
     def share(self, outcome: str) -> float:
         """Return the share of one outcome."""
@@ -108,6 +123,7 @@ def summarise(folder: Path, name: str) -> LotSummary:
             "ON r.sha256 = i.recipe_sha256 WHERE lot = ? GROUP BY r.sha256 ORDER BY 4 DESC",
             (name,),
         ).fetchall()
+        limits, sized = _limits(ask, recipes[0][2]) if recipes else ((), False)
         sums = "SELECT avg(duration_ms) / 1000.0, sum(simulated), sum(late) FROM inspections WHERE lot = ?"
         mean_s, simulated, late = ask(sums, (name,)).fetchone()
         held = ask(
@@ -129,6 +145,8 @@ def summarise(folder: Path, name: str) -> LotSummary:
             recipes=tuple(recipes),
             slices=tuple((ok, bad, none) for ok, bad, none in slices),
             areas=_areas(ask, name),
+            limits=limits,
+            sized=sized,
             mean_duration_s=mean_s,
             simulated=simulated or 0,
             late=late or 0,
@@ -137,17 +155,30 @@ def summarise(folder: Path, name: str) -> LotSummary:
         )
 
 
-def _areas(ask: Any, name: str) -> tuple[tuple[float, int, int], ...]:
-    condition = "lot = ? AND area_mm2 NOT NULL AND outcome IN ('PASS', 'FAIL')"
+def _areas(ask: Any, name: str) -> tuple[Bin, ...]:
+    condition = "lot = ? AND area_mm2 NOT NULL AND outcome NOT NULL"
     largest = ask(f"SELECT max(area_mm2) FROM inspections WHERE {condition}", (name,)).fetchone()[0]  # noqa: S608 (a constant)
     if not largest:
         return ()
     width = largest / BINS
-    counts = [[0, 0] for _ in range(BINS)]
+    counts = [Counter[str]() for _ in range(BINS)]
     query = f"SELECT min(CAST(area_mm2 / ? AS INTEGER), ?), outcome, count(*) FROM inspections WHERE {condition} GROUP BY 1, 2"  # noqa: E501, S608 (a constant)
     for index, outcome, number in ask(query, (width, BINS - 1, name)):
-        counts[max(0, index)][outcome == "FAIL"] = number
-    return tuple((width * (index + 1), passed, failed) for index, (passed, failed) in enumerate(counts))
+        counts[max(0, index)][outcome] = number
+    return tuple(
+        (width * (index + 1), each["PASS"], each["FAIL"], each["NO_RESULT"]) for index, each in enumerate(counts)
+    )
+
+
+def _limits(ask: Any, sha256: str) -> tuple[tuple[tuple[float, float], ...], bool]:
+    """Read a recipe's limits on areas, and whether they go with the fruit's size; none of an unknown format."""
+    (text,) = ask("SELECT text FROM recipe_snapshots WHERE sha256 = ?", (sha256,)).fetchone()
+    try:
+        damage = json.loads(text)["damage"]
+        limits = tuple((float(each["closing_mm"]), float(each["area_mm2"])) for each in damage["area"])
+    except (ValueError, KeyError, TypeError):
+        return (), False
+    return limits, bool(damage.get("size"))
 
 
 def _examples(connection: Any, folder: Path, name: str) -> list[Example]:

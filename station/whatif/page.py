@@ -13,7 +13,7 @@ from markupsafe import Markup
 from sqlalchemy import Connection
 
 from station.calibration.gate import gated
-from station.charts.area_chart import Curve, Limit, Size, Texts, area_chart, style
+from station.charts.area_chart import Curve, Limit, Size, Texts, area_chart, report_style
 from station.recipe_store.difference import Difference
 from station.records.images import image_path
 from station.settings.recipe_model import Recipe
@@ -27,7 +27,7 @@ from station.whatif.replay import Replayed
 from station.whatif.stored import read_gate_factor
 
 MOST_SHOWN = 60
-_CHART = Size(300, 170, 12)
+_CHART = Size(300, 200, 12)
 _PICTURE_PX = 150
 _WHITE, _ORANGE = (255, 255, 255), (0, 140, 255)
 
@@ -38,7 +38,7 @@ class FruitView:
 
     result: Replayed
     chart: Markup
-    """Area over closing, with the limits of then and of the draft."""
+    """Area over closing, with the limits at the time of the inspection and the draft's."""
     picture: str
     """A data URI of its last image with the contact's outline; empty if none was stored."""
 
@@ -68,7 +68,7 @@ def render(page: Page) -> str:
         lstrip_blocks=True,
     )
     template = environment.get_template("whatif.html.j2")
-    return template.render(page=page, before=BEFORE, after=AFTER, chart_style=style())
+    return template.render(page=page, before=BEFORE, after=AFTER, report_style=report_style())
 
 
 def fruit_views(

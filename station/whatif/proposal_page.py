@@ -9,18 +9,20 @@ import jinja2
 import numpy as np
 from matplotlib.figure import Figure
 
+from station.charts.area_chart import report_style
 from station.whatif.proposal import Proposal
 
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Thresholds: {{ title }}</title>
-<style>body { font: 15px/1.45 system-ui, sans-serif; max-width: 900px; margin: 0 auto; padding: 20px 16px; }
-img { max-width: 100%; }</style></head><body>
+<style>{{ report_style }}</style></head><body><main>
 <h1>Thresholds: {{ title }}</h1>
-{% for line in lines %}<p>{{ line }}</p>{% endfor %}
-<img src="{{ histogram }}" alt="histogram of good and bad fruit">
-<img src="{{ errors }}" alt="both errors over the limit">
+<div class="box">{% for line in lines %}<p>{{ line }}</p>{% endfor %}</div>
+<h2>Good and bad fruit, and the limit</h2>
+<div class="box"><img src="{{ histogram }}" alt="histogram of good and bad fruit"></div>
+<h2>Both errors over the limit</h2>
+<div class="box"><img src="{{ errors }}" alt="both errors over the limit">
 <p><label>Another limit: <input id="limit" type="range" min="0" max="{{ curve|length - 1 }}" value="{{ chosen }}"
-style="width: 60%"></label> <output id="told"></output></p>
+style="width: 60%"></label> <output id="told"></output></p></div>
 <script>
 const curve = {{ curve|tojson }}, slider = document.getElementById("limit");
 const share = (name, errors) => `${errors.count} of ${errors.of} ${name} ` +
@@ -33,7 +35,7 @@ const show = () => {
 slider.addEventListener("input", show);
 show();
 </script>
-</body></html>
+</main></body></html>
 """
 
 
@@ -107,7 +109,7 @@ def page_of(title: str, best: Proposal, figures: dict[str, Any]) -> str:
     chosen = min(range(len(curve)), key=lambda place: abs(curve[place]["limit_mm2"] - best.limit_mm2))
     pictures = {"histogram": _histogram(best), "errors": _errors(best, curve)}
     return environment.from_string(_PAGE).render(
-        title=title, lines=lines_of(figures), curve=curve, chosen=chosen, **pictures
+        title=title, lines=lines_of(figures), curve=curve, chosen=chosen, report_style=report_style(), **pictures
     )
 
 
@@ -116,7 +118,7 @@ def _histogram(best: Proposal) -> str:
     figure = Figure(figsize=(7.2, 3.0), layout="constrained")
     axes = figure.add_subplot()
     groups = [values[np.isfinite(values)] for values in (best.good, best.bad)]
-    axes.hist(groups, bins=30, label=["good", "bad"], color=["#1f4e79", "#b3261e"])
+    axes.hist(groups, bins=30, label=["good", "bad"], color=["#5b7f95", "#b3261e"])
     axes.axvline(best.limit_mm2, color="#222222")
     axes.set_xlabel(f"least limit by which the fruit passes, at {best.closing_mm:g} mm of closing [mm²]")
     axes.set_ylabel("fruit")
@@ -129,7 +131,7 @@ def _errors(best: Proposal, curve: Sequence[dict[str, Any]]) -> str:
     figure = Figure(figsize=(7.2, 3.0), layout="constrained")
     axes = figure.add_subplot()
     limits = [point["limit_mm2"] for point in curve]
-    for name, told, colour in (("good_diverted", "good diverted", "#1f4e79"), ("bad_passed", "bad passed", "#b3261e")):
+    for name, told, colour in (("good_diverted", "good diverted", "#5b7f95"), ("bad_passed", "bad passed", "#b3261e")):
         axes.plot(limits, [100 * point[name]["share"] for point in curve], color=colour, label=told)
         low, high = ([100 * point[name]["interval"][end] for point in curve] for end in (0, 1))
         axes.fill_between(limits, low, high, color=colour, alpha=0.15)
