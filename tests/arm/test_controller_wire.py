@@ -21,6 +21,7 @@ from station.twin.clock import SteadyClock
 from station.twin.faults import FaultBoard
 from station.twin.ur.controller import UrController
 from station.twin.ur.registers import Registers
+from tests.arm import ur_clients
 
 HEADER = struct.Struct(">HB")
 
@@ -198,6 +199,44 @@ def test_rubbish_costs_its_sender_the_connection_and_nobody_else(bench, rubbish)
             writer.transport.abort()
             assert await other.ask("V", struct.pack(">H", 2)) == b"\x01"
             other.close()
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("names", [ur_clients.RECORD, ur_clients.CLIENT_LIBRARY], ids=["record", "client_library"])
+def test_the_outputs_that_the_makers_clients_ask_for_are_all_there(bench, names):
+    async def run():
+        async with bench() as made:
+            client = await plain(made.host)
+            kinds = await client.ask("O", struct.pack(">d", 125.0) + names.replace(" ", "").encode())
+            assert kinds[0] == 1, kinds
+            assert len(kinds[1:].decode().split(",")) == names.count(",") + 1
+            assert await client.ask("S") == b"\x01"
+            assert len(await client.hear("U")) > 4 * names.count(",")
+            client.close()
+
+    asyncio.run(run())
+
+
+def test_outputs_that_a_client_sets_are_read_back(bench):
+    client = """
+import sys
+from rtde_io import RTDEIOInterface
+from rtde_receive import RTDEReceiveInterface
+io, receive = RTDEIOInterface(sys.argv[1]), RTDEReceiveInterface(sys.argv[1])
+assert io.setStandardDigitalOut(7, True) and io.setConfigurableDigitalOut(1, True) and io.setToolDigitalOut(0, True)
+until(lambda: all(map(receive.getDigitalOutState, (7, 9, 16))))
+assert not receive.getDigitalOutState(17)
+assert io.setToolDigitalOut(0, False)
+until(lambda: not receive.getDigitalOutState(16))
+assert io.setAnalogOutputVoltage(0, 0.25) and io.setAnalogOutputCurrent(1, 0.5)
+until(lambda: abs(receive.getStandardAnalogOutput0() - 2.5) < 1e-9)
+until(lambda: abs(receive.getStandardAnalogOutput1() - 0.012) < 1e-9)
+"""
+
+    async def run():
+        async with bench() as made:
+            await run_client(client, made.host)
 
     asyncio.run(run())
 
@@ -387,7 +426,8 @@ def test_the_dashboard_answers_line_by_line(bench, until):
             made.clock.skip(5.0)
             assert await ask("unlock protective stop") == "Protective stop releasing"
             assert await ask("safetystatus") == "Safetystatus: NORMAL"
-            assert await ask("quit") != ""
+            for line, answer in ur_clients.DASHBOARD.items():
+                assert await ask(line) == answer
             assert await reader.read() == b""
             writer.transport.abort()
 

@@ -9,6 +9,7 @@ from station.twin.clock import Clock
 from station.twin.faults import CommonFault, FaultBoard
 from station.twin.ur.body import Body
 from station.twin.ur.dashboard import Dashboard
+from station.twin.ur.inputs_outputs import InputsOutputs
 from station.twin.ur.kinematics import JOINT_RANGE_RAD, Joints
 from station.twin.ur.network import Network
 from station.twin.ur.outputs import output_table
@@ -93,7 +94,6 @@ class UrController:
         self.version_text = ".".join(map(str, self.version))
         self.serial_number = "20245500001"
         self.speed_slider = 1.0
-        self.digital_outputs = 0
         self.network = Network(self)
         self._tick = 0
         self._timer: asyncio.Handle | None = None
@@ -108,6 +108,7 @@ class UrController:
         self._booted_at_s = self.clock.now_s()
         self.body = Body(joints_rad, self._booted_at_s, self._joint_range_rad)
         self.registers = Registers()
+        self.inputs_outputs = InputsOutputs()
         self.safety = Safety(running=running)
         self.script = ControlScript(self.body, self.registers, self.safety)
         self.outputs = output_table(self)
@@ -156,9 +157,7 @@ class UrController:
         written = dict(values)
         if written.get("speed_slider_mask"):
             self.speed_slider = min(max(0.0, written.get("speed_slider_fraction", 1.0)), 1.0)
-        mask = written.get("standard_digital_output_mask", 0)
-        wanted = written.get("standard_digital_output", 0)
-        self.digital_outputs = (self.digital_outputs & ~mask) | (wanted & mask)
+        self.inputs_outputs.write(written)
 
     async def start(self) -> None:
         """Open the ports and start the cycle.

@@ -17,12 +17,24 @@ TOO_EARLY = (
     "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking"
 )
 
+_WITH_ARGUMENT = {
+    "load installation": "File not found: {}",
+    "load": "File not found: {}",
+    "popup": "showing popup",
+    "addtolog": "Added log message",
+    "set operational mode": "",
+    "generate flight report": "Flight Report generated with id: 1",
+    "generate support file": "Completed successfully: {}",
+}
+"""Commands with an argument, and their answers with it; the longer of two that begin alike is first."""
+
 
 class Dashboard:
     """The answers, without a socket."""
 
     def __init__(self, controller: Controller) -> None:
         self._controller = controller
+        self._operational_mode = "NONE"
         safety, script = controller.safety, controller.script
         self._questions: dict[str, Callable[[], str]] = {
             "polyscopeversion": lambda: f"URSoftware {controller.version_text} (Nov 01 2025)",
@@ -37,6 +49,12 @@ class Dashboard:
             "programstate": lambda: f"{script.runtime_state.name} <unnamed>",
             "get loaded program": lambda: "No program loaded",
             "close popup": lambda: "closing popup",
+            "isprogramsaved": lambda: "true <unnamed>",
+            "get operational mode": lambda: self._operational_mode,
+            "clear operational mode": lambda: self._set_operational_mode("NONE"),
+            "quit": lambda: "Disconnected",
+            "shutdown": lambda: "Shutting down",
+            "help": lambda: f"Commands: {', '.join(sorted((*self._questions, *self._orders, *_WITH_ARGUMENT)))}",
         }
         self._orders: dict[str, Callable[[], str]] = {
             "stop": self._stop,
@@ -55,13 +73,32 @@ class Dashboard:
         command = " ".join(line.lower().split())
         if command in self._questions:
             return self._questions[command]()
-        if command.startswith(("popup ", "addtolog ")):
-            return "showing popup" if command.startswith("popup") else "Added log message"
+        if (said := self._with_argument(line.strip())) is not None:
+            return said
         if command not in self._orders:
             return f'could not understand: "{line.strip()}"'
         if not self._controller.safety.remote:
             return NOT_NOW
         return self._orders[command]()
+
+    def _with_argument(self, line: str) -> str | None:
+        """Return the answer to a command that has an argument; None for another one. Programs are not held here."""
+        for command, answer in _WITH_ARGUMENT.items():
+            argument = line[len(command) :].strip()
+            if line.lower().startswith(command + " ") and argument:
+                if command == "set operational mode":
+                    return self._set_operational_mode(argument.upper())
+                return answer.format(argument)
+        return None
+
+    def _set_operational_mode(self, mode: str) -> str:
+        if mode == "NONE":
+            self._operational_mode = mode
+            return "operational mode is no longer controlled by Dashboard Server"
+        if mode not in {"MANUAL", "AUTOMATIC"}:
+            return f"Failed setting operational mode: {mode.lower()}"
+        self._operational_mode = mode
+        return f"Setting operational mode: {mode.lower()}"
 
     def _stop(self) -> str:
         self._controller.script.end("the dashboard stopped the program")

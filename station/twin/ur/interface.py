@@ -6,6 +6,7 @@ from typing import Any, Protocol
 from station.twin.clock import Clock
 from station.twin.faults import FaultBoard
 from station.twin.ur.body import Body
+from station.twin.ur.inputs_outputs import InputsOutputs
 from station.twin.ur.registers import Registers
 from station.twin.ur.safety import Safety
 from station.twin.ur.script import ControlScript
@@ -25,9 +26,9 @@ class Controller(Protocol):
     version_text: str
     serial_number: str
     speed_slider: float
-    digital_outputs: int
     body: Body
     registers: Registers
+    inputs_outputs: InputsOutputs
     safety: Safety
     script: ControlScript
 

@@ -1,7 +1,6 @@
 """The RTDE outputs: which there are, of which type, and where their values come from.
 
-Names and types: RTDE guide, table "Robot controller outputs". What the twin does not model (currents, temperatures,
-voltages, forces) has a constant, believable value.
+Names and types: RTDE guide, table "Robot controller outputs".
 """
 
 import re
@@ -11,75 +10,125 @@ from station.twin.ur.registers import COUNT
 from station.twin.ur.script import RuntimeState
 
 JOINT_RUNNING, JOINT_POWER_OFF = 253, 239
-_REGISTER = re.compile(r"output_(int|double)_register_(\d{1,2})")
+_REGISTER = re.compile(r"(input|output)_(int|double|bit)_register_(\d{1,3})")
+_CONSTANT: dict[str, tuple[str, tuple[float, ...]]] = {
+    "target_qdd": ("VECTOR6D", (0.0,) * 6),
+    "target_current": ("VECTOR6D", (0.0,) * 6),
+    "target_moment": ("VECTOR6D", (0.0,) * 6),
+    "actual_current": ("VECTOR6D", (0.0,) * 6),
+    "actual_current_window": ("VECTOR6D", (0.0,) * 6),
+    "joint_control_output": ("VECTOR6D", (0.0,) * 6),
+    "actual_TCP_force": ("VECTOR6D", (0.0,) * 6),
+    "actual_digital_input_bits": ("UINT64", (0,)),
+    "joint_temperatures": ("VECTOR6D", (28.0,) * 6),
+    "actual_execution_time": ("DOUBLE", (0.0005,)),
+    "actual_tool_accelerometer": ("VECTOR3D", (0.0, 0.0, -9.82)),
+    "actual_momentum": ("DOUBLE", (0.0,)),
+    "actual_main_voltage": ("DOUBLE", (48.0,)),
+    "actual_robot_energy_consumed": ("DOUBLE", (0.0,)),
+    "actual_robot_braking_energy_dissipated": ("DOUBLE", (0.0,)),
+    "encoder0_raw": ("INT32", (0,)),
+    "encoder1_raw": ("INT32", (0,)),
+    "elbow_position": ("VECTOR3D", (0.0,) * 3),
+    "elbow_velocity": ("VECTOR3D", (0.0,) * 3),
+    "standard_analog_input0": ("DOUBLE", (0.0,)),
+    "standard_analog_input1": ("DOUBLE", (0.0,)),
+    "io_current": ("DOUBLE", (0.03,)),
+    "euromap67_input_bits": ("UINT32", (0,)),
+    "euromap67_output_bits": ("UINT32", (0,)),
+    "euromap67_24V_voltage": ("DOUBLE", (0.0,)),
+    "euromap67_24V_current": ("DOUBLE", (0.0,)),
+    "tool_mode": ("UINT32", (253,)),
+    "tool_analog_input_types": ("UINT32", (0,)),
+    "tool_analog_input0": ("DOUBLE", (0.0,)),
+    "tool_analog_input1": ("DOUBLE", (0.0,)),
+    "tool_output_voltage": ("INT32", (24,)),
+    "tool_output_current": ("DOUBLE", (0.1,)),
+    "tool_temperature": ("DOUBLE", (30.0,)),
+    "tool_output_mode": ("UINT8", (0,)),
+    "tool_digital_output0_mode": ("UINT8", (1,)),
+    "tool_digital_output1_mode": ("UINT8", (1,)),
+    "tcp_force_scalar": ("DOUBLE", (0.0,)),
+    "joint_position_deviation_ratio": ("DOUBLE", (0.0,)),
+    "collision_detection_ratio": ("DOUBLE", (0.0,)),
+    "time_scale_source": ("INT32", (-1,)),
+    "target_gravity": ("VECTOR3D", (0.0, 0.0, 9.82)),
+    "script_control_line": ("UINT32", (0,)),
+    "ft_raw_wrench": ("VECTOR6D", (0.0,) * 6),
+    "wrench_calc_from_currents": ("VECTOR6D", (0.0,) * 6),
+    "payload_inertia": ("VECTOR6D", (0.0,) * 6),
+}
+"""What the twin does not model: type, and a constant, believable value."""
 
 
 def output(controller: Controller, name: str) -> tuple[str, Getter] | None:
     """RTDE type and source of an output; None where this version of the controller has none of that name."""
-    match = _REGISTER.fullmatch(name)
-    if match is not None and int(match[2]) < COUNT:
-        number = int(match[2])
-        if match[1] == "int":
-            return "INT32", lambda: (controller.registers.output_int[number],)
-        return "DOUBLE", lambda: (controller.registers.output_double[number],)
+    if (match := _REGISTER.fullmatch(name)) is not None:
+        return _register(controller, name, match[1], match[2], int(match[3]))
     return controller.outputs.get(name)
+
+
+def _register(controller: Controller, name: str, way: str, kind: str, number: int) -> tuple[str, Getter] | None:
+    """Return the type and source of one register; an input is read back as it was written."""
+    registers = controller.registers
+    if not (64 <= number <= 127 if kind == "bit" else number < COUNT):
+        return None
+    rtde_type = {"int": "INT32", "double": "DOUBLE", "bit": "BOOL"}[kind]
+    if way == "input":
+        return rtde_type, lambda: (registers.inputs.get(name, 0),)
+    if kind == "bit":
+        return rtde_type, lambda: (False,)
+    values = registers.output_int if kind == "int" else registers.output_double
+    return rtde_type, lambda: (values[number],)
 
 
 def output_table(controller: Controller) -> dict[str, tuple[str, Getter]]:
     """Every output but the registers, by name: its RTDE type and its source."""
     body, safety, script = controller.body, controller.safety, controller.script
 
-    def constant(*values: float) -> Getter:
+    io, inputs = controller.inputs_outputs, controller.registers.inputs
+
+    def same(values: tuple[float, ...]) -> Getter:
         return lambda: values
 
-    six_zeros = constant(*(0.0,) * 6)
     table: dict[str, tuple[str, Getter]] = {
+        **{name: (kind, same(values)) for name, (kind, values) in _CONSTANT.items()},
         "timestamp": ("DOUBLE", lambda: (controller.uptime_s,)),
         "target_q": ("VECTOR6D", lambda: body.joints_rad),
         "target_qd": ("VECTOR6D", lambda: body.speeds_rad_s),
-        "target_qdd": ("VECTOR6D", six_zeros),
-        "target_current": ("VECTOR6D", six_zeros),
-        "target_moment": ("VECTOR6D", six_zeros),
         "actual_q": ("VECTOR6D", controller.measured_joints_rad),
         "actual_qd": ("VECTOR6D", lambda: body.speeds_rad_s),
-        "actual_current": ("VECTOR6D", six_zeros),
-        "joint_control_output": ("VECTOR6D", six_zeros),
         "actual_TCP_pose": ("VECTOR6D", body.tool_pose),
         "actual_TCP_speed": ("VECTOR6D", body.tool_speed),
-        "actual_TCP_force": ("VECTOR6D", six_zeros),
         "target_TCP_pose": ("VECTOR6D", body.tool_pose),
         "target_TCP_speed": ("VECTOR6D", body.tool_speed),
-        "actual_digital_input_bits": ("UINT64", constant(0)),
-        "joint_temperatures": ("VECTOR6D", constant(*(28.0,) * 6)),
-        "actual_execution_time": ("DOUBLE", constant(0.0005)),
         "robot_mode": ("INT32", lambda: (safety.robot_mode.value,)),
         "joint_mode": ("VECTOR6INT32", lambda: (JOINT_RUNNING if safety.powered else JOINT_POWER_OFF,) * 6),
         "safety_mode": ("INT32", lambda: (safety.safety_mode.value,)),
         "safety_status": ("INT32", lambda: (safety.safety_mode.value,)),
-        "actual_tool_accelerometer": ("VECTOR3D", constant(0.0, 0.0, -9.82)),
         "speed_scaling": ("DOUBLE", lambda: (controller.speed_scaling,)),
         "target_speed_fraction": ("DOUBLE", lambda: (controller.speed_slider,)),
-        "actual_momentum": ("DOUBLE", constant(0.0)),
-        "actual_main_voltage": ("DOUBLE", constant(48.0)),
         "actual_robot_voltage": ("DOUBLE", lambda: (48.0 if safety.powered else 0.0,)),
         "actual_robot_current": ("DOUBLE", lambda: (0.7 if safety.powered else 0.0,)),
         "actual_joint_voltage": ("VECTOR6D", lambda: (48.0 if safety.powered else 0.0,) * 6),
-        "actual_digital_output_bits": ("UINT64", lambda: (controller.digital_outputs,)),
+        "actual_digital_output_bits": ("UINT64", lambda: (io.digital_bits,)),
         "runtime_state": ("UINT32", lambda: (script.runtime_state.value,)),
-        "standard_analog_input0": ("DOUBLE", constant(0.0)),
-        "standard_analog_input1": ("DOUBLE", constant(0.0)),
-        "standard_analog_output0": ("DOUBLE", constant(0.0)),
-        "standard_analog_output1": ("DOUBLE", constant(0.0)),
         "robot_status_bits": (
             "UINT32",
             lambda: (safety.powered | (script.runtime_state is RuntimeState.PLAYING) << 1,),
         ),
         "safety_status_bits": ("UINT32", lambda: (safety.bits,)),
-        "ft_raw_wrench": ("VECTOR6D", six_zeros),
+        "tcp_offset": ("VECTOR6D", lambda: body.tcp_offset),
+        "analog_io_types": ("UINT32", lambda: (io.analog_types,)),
+        "standard_analog_output0": ("DOUBLE", lambda: (io.analog_output(0),)),
+        "standard_analog_output1": ("DOUBLE", lambda: (io.analog_output(1),)),
+        "output_bit_registers0_to_31": ("UINT32", lambda: (0,)),
+        "output_bit_registers32_to_63": ("UINT32", lambda: (0,)),
+        "input_bit_registers0_to_31": ("UINT32", lambda: (inputs.get("input_bit_registers0_to_31", 0),)),
+        "input_bit_registers32_to_63": ("UINT32", lambda: (inputs.get("input_bit_registers32_to_63", 0),)),
         "payload": ("DOUBLE", lambda: (script.payload_kg,)),
         "payload_cog": ("VECTOR3D", lambda: script.payload_cog_m),
-        "payload_inertia": ("VECTOR6D", six_zeros),
     }
     if controller.polyscope >= (5, 23):
-        table["actual_current_as_torque"] = ("VECTOR6D", six_zeros)
+        table["actual_current_as_torque"] = ("VECTOR6D", same((0.0,) * 6))
     return table
