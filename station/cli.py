@@ -39,6 +39,7 @@ COMMANDS = {
     "run": Entry("station.commands.run:run", "Run the station: all its processes, supervised."),
     "service": Entry("station.commands.service:service", "Inspect fruit at the PLC's triggers."),
     "study": Entry("station.commands.study:study", "Repeat the paper's experiments on the simulated world."),
+    "support": Entry("station.commands.support:support", "Write a support bundle, without secrets."),
     "thresholds": Entry("station.commands.thresholds:thresholds", "Propose damage thresholds from marked fruit."),
     "twin": Entry("station.twin.command:twin", "Run the simulated world, or draw from it."),
     "verify": Entry("station.commands.verify:verify", "Verify the sensor with the ball, at the start of a shift."),

@@ -1,0 +1,128 @@
+"""Support bundle: one ZIP file with versions, configuration, recipes, logs, recent inspections and alarms.
+
+Nothing secret is in it by construction: only what is listed here is written. Passwords, PINs, tokens and keys are in
+files of their own, which nothing here reads; the configuration holds only their paths. Images are left out for their
+size, people and the audit trail because they are personal.
+"""
+
+import contextlib
+import json
+import os
+import platform
+import shutil
+import sys
+import urllib.request
+import zipfile
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from importlib.metadata import distributions, version
+from pathlib import Path
+
+from station.errors import StationError
+from station.records.database import reading, records_folder
+from station.records.queries import read_alarm_log, read_alarms, read_inspection
+from station.records.report import format_inspection, format_list
+from station.records.search import Query, find_page
+from station.settings.configuration import Configuration
+from station.settings.recipe import recipe_files
+
+LOG_BYTES = 2_000_000
+"""Of the end of each log file."""
+_INSPECTIONS_LISTED, _INSPECTIONS_WHOLE, _ALARMS = 200, 20, 1_000
+_ANSWER_LIMIT_S = 2.0
+
+
+def bundle(site: Configuration, target: Path) -> tuple[str, ...]:
+    """Write the bundle; a part that cannot be had is replaced by the reason, as a station in trouble has few parts.
+
+    Args:
+        site: the configuration in force.
+        target: the ZIP file to write.
+
+    Returns:
+        The names of the parts.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    parts = dict(_parts(site))
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, make in parts.items():
+            archive.writestr(name, _made(make))
+    return tuple(parts)
+
+
+def _made(make: Callable[[], str | bytes]) -> str | bytes:
+    try:
+        return make()
+    except (StationError, OSError, ValueError) as error:
+        return f"not available: {error}\n"
+
+
+def _parts(site: Configuration) -> Iterator[tuple[str, Callable[[], str | bytes]]]:
+    """Yield each part's name with the function that makes it."""
+    yield "about.txt", lambda: _about(site.home)
+    yield "packages.txt", _packages
+    yield "configuration.json", lambda: site.model_dump_json(indent=2)
+    with contextlib.suppress(StationError):  # no folder of recipes: the readiness says so
+        for file in recipe_files(site.recipes_folder):
+            yield f"recipes/{file.name}", file.read_bytes
+    for page in ("readyz", "metrics"):
+        yield f"{page}.txt", lambda page=page: _answer(site, page)
+    for file in sorted((site.home / "logs").glob("*.log")):
+        yield f"logs/{file.name}", lambda file=file: _end_of(file)
+    folder = records_folder(site.home)
+    yield "alarms.json", lambda: _alarms(folder)
+    yield "inspections.txt", lambda: _inspections(folder)
+
+
+def _about(home: Path) -> str:
+    disk = shutil.disk_usage(home)
+    return (
+        f"made         {datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC\n"
+        f"station      {version('fruit-station')}\n"
+        f"Python       {sys.version.split()[0]}\n"
+        f"system       {platform.platform()}\n"
+        f"processors   {os.cpu_count()}\n"
+        f"home         {home}\n"
+        f"disk         {disk.free / 1e9:.1f} GB free of {disk.total / 1e9:.1f} GB\n"
+    )
+
+
+def _packages() -> str:
+    return "".join(sorted(f"{each.name}=={each.version}\n" for each in distributions()))
+
+
+def _answer(site: Configuration, page: str) -> str:
+    """Return what the running station answers; "not ready" is an answer too."""
+    address = f"http://{site.metrics.host}:{site.metrics.port}/{page}"
+    opener = urllib.request.build_opener(_KeepError())
+    with opener.open(address, timeout=_ANSWER_LIMIT_S) as answer:
+        return answer.read().decode("utf-8", "replace")
+
+
+class _KeepError(urllib.request.HTTPErrorProcessor):
+    """Gives an answer of any status to the caller."""
+
+    def http_response(self, request: urllib.request.Request, response: object) -> object:
+        """Return the answer as it is."""
+        return response
+
+
+def _end_of(file: Path) -> bytes:
+    with file.open("rb") as opened:
+        opened.seek(max(0, file.stat().st_size - LOG_BYTES))
+        return opened.read()
+
+
+def _alarms(folder: Path) -> str:
+    with reading(folder) as connection:
+        active, log = read_alarms(connection), read_alarm_log(connection, _ALARMS)
+    return json.dumps({"active": list(map(str, active)), "log": list(map(str, log))}, indent=1)
+
+
+def _inspections(folder: Path) -> str:
+    with reading(folder) as connection:
+        rows = find_page(connection, Query(), _INSPECTIONS_LISTED).rows
+        whole = [read_inspection(connection, row.sequence, folder) for row in rows[:_INSPECTIONS_WHOLE]]
+    return "\n\n".join([format_list(rows), *map(format_inspection, whole)])
