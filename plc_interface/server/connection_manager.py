@@ -46,7 +46,9 @@ class ConnectionManager:
         self._log = LimitedLog(log)
         self._sweeping: asyncio.TimerHandle | None = None
         self.write_lock = WriteLock(settings.writer_lease_s, self._report_writer)
-        self._handler = RequestHandler(settings.unit, image, on_write, self._claim, self.write_lock.release)
+        self._handler = RequestHandler(
+            settings.unit, image, on_write, self._claim, self.write_lock.owned_by, self.write_lock.release
+        )
         self.statistics = Statistics()
 
     @property

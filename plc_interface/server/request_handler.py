@@ -28,24 +28,35 @@ _WRITING: Mapping[int, writing.Parser] = {
 }
 _KEY = "write_key"
 
+THE_SERVER_ITSELF = (0, 255)
+"""Unit identifiers by which a client means the server at the address, no device behind a gateway: Modbus Messaging on
+TCP/IP Implementation Guide V1.0b, 4.4.1.2. There is no broadcast on TCP."""
+
 
 class RequestHandler:
     """Handles the requests to one unit."""
 
     def __init__(
-        self, unit: int, image: RegisterImage, on_write: OnWrite, claim: Claim, release: Callable[[], None]
+        self,
+        unit: int,
+        image: RegisterImage,
+        on_write: OnWrite,
+        claim: Claim,
+        owns: Callable[[Peer], bool],
+        release: Callable[[], None],
     ) -> None:
         """Answer from an image.
 
         Args:
-            unit: the only valid unit identifier.
+            unit: the valid unit identifier beside those of the server itself.
             image: read, and written after `on_write` agreed.
             on_write: see `OnWrite`.
             claim: see `Claim`.
+            owns: whether a client has the right to write.
             release: called after the writer has released the right to write.
         """
         self._unit, self._image = unit, image
-        self._on_write, self._claim, self._release = on_write, claim, release
+        self._on_write, self._claim, self._owns, self._release = on_write, claim, owns, release
         self._reading: Mapping[int, Callable[[bytes], bytes]] = {
             1: partial(reading.read_bits, image),
             2: partial(reading.read_bits, image),
@@ -65,7 +76,7 @@ class RequestHandler:
         Raises:
             RequestError: the request is answered with an exception.
         """
-        if unit != self._unit:
+        if unit not in {self._unit, *THE_SERVER_ITSELF}:
             why = f"unit {unit} was asked, this is unit {self._unit}"
             raise RequestError(ExceptionCode.GATEWAY_NO_RESPONSE, Trouble.UNKNOWN_UNIT, why)
         read = self._reading.get(message[0])
@@ -80,7 +91,9 @@ class RequestHandler:
         return self._write(peer, parse(self._image, message))
 
     def _write(self, peer: Peer, write: writing.Write) -> bytes:
-        if write.values.keys() != {_KEY} and write.values.get(_KEY, self._image.value(_KEY)) != WRITE_KEY:
+        gives_back = _KEY in write.values and self._owns(peer)
+        key = write.values.get(_KEY, self._image.value(_KEY))
+        if key != WRITE_KEY and write.values.keys() != {_KEY} and not gives_back:
             why = f"{_KEY} is not set: write {WRITE_KEY:#06x} there before, or in the same request"
             raise RequestError(ExceptionCode.BUSY, Trouble.NOT_WRITER, why)
         if not self._claim(peer):

@@ -54,6 +54,10 @@ class WriteLock:
         self._expires_s = now_s + self._lease_s
         return True
 
+    def owned_by(self, peer: Peer) -> bool:
+        """Whether this connection has the right to write."""
+        return self.holder is peer
+
     def expire(self, now_s: float) -> None:
         """Withdraw the right if the owner did not write in time."""
         if self.holder is not None and now_s > self._expires_s:

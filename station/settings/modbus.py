@@ -67,7 +67,8 @@ class ModbusSettings(Settings):
     unit: int = setting(
         1,
         title="Unit",
-        description="Modbus unit identifier that the station answers to; 0 and 248 to 255 are reserved.",
+        description="Modbus unit identifier that the station answers to; 0 and 255 mean the server itself and are "
+        "answered too.",
         ge=1,
         le=247,
     )

@@ -88,7 +88,7 @@ def unknown_function(source: random.Random) -> Malformed:
 
 
 def unknown_unit(source: random.Random) -> Malformed:
-    unit = source.choice([each for each in range(256) if each != UNIT])
+    unit = source.choice([each for each in range(256) if each not in {UNIT, 0, 255}])
     return Malformed("unit", _frame(source, _read(source), unit=unit), 11)
 
 

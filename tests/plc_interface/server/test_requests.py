@@ -153,6 +153,11 @@ BAD = {
 HEADINGS = {1: Trouble.ILLEGAL_FUNCTION, 2: Trouble.ILLEGAL_ADDRESS, 3: Trouble.ILLEGAL_VALUE}
 
 
+@pytest.mark.parametrize("unit", [0, 255])
+def test_a_client_may_mean_the_server_itself(plc, unit):
+    assert plc.ask(struct.pack(">BHH", 3, BY_NAME["reference_u16"].address, 1), unit) == b"\x03\x02\x12\x34"
+
+
 class TestBadRequests:
     def refused(self, serving, plc, caplog, request, code, unit=1, heading=None):
         """The exception, its count, its line in the log with the peer, and nothing written."""
@@ -172,7 +177,7 @@ class TestBadRequests:
     def test_each_has_its_exception_count_and_line(self, serving, plc, caplog, request_, code):
         self.refused(serving, plc, caplog, request_, code)
 
-    @pytest.mark.parametrize("unit", [0, 2, 255])
+    @pytest.mark.parametrize("unit", [2, 247, 248, 254])
     def test_another_unit(self, serving, plc, caplog, unit):
         self.refused(serving, plc, caplog, struct.pack(">BHH", 3, 0, 1), 11, unit, Trouble.UNKNOWN_UNIT)
 

@@ -79,6 +79,15 @@ class TestOnTheWire:
         plc = connect(serving)
         assert plc.write(0, *[0] * 26, WRITE_KEY)[0] == 16
         assert serving.server.writer is not None
+
+    def test_the_write_of_a_whole_scan_gives_the_key_back(self, serve, connect):
+        serving = serve()
+        plc, other = connect(serving), connect(serving, "127.0.0.2")
+        assert other.write(0, *[0] * 27) == BUSY
+        plc.claim()
+        assert other.write(0, *[0] * 27) == BUSY
+        assert plc.write(0, *[0] * 27)[0] == 16
+        assert [change for _, change in serving.changes] == [WriterChange.CLAIMED, WriterChange.RELEASED]
         assert plc.write(0, *[0] * 27) == BUSY
 
     def test_another_client_is_refused_until_the_writer_disconnects(self, serve, connect, caplog):
