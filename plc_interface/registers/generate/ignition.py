@@ -1,7 +1,7 @@
 """Ignition's tags as JSON: one folder for each block.
 
 Ignition's documentation, "Modbus Addressing": one-based addresses; HR signed and HRUS unsigned 16-bit, HRI and HRUI
-32-bit, HRUI_64 unsigned 64-bit, HRF float, HRS text with its length in characters.
+32-bit, HRUI_64 unsigned 64-bit, HRF float, HRS text with its length in characters. Tags only read: the PLC writes.
 """
 
 import json
@@ -9,7 +9,7 @@ from typing import Any
 
 from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
 from plc_interface.registers.map import GROUPS
-from plc_interface.registers.register import Access, Kind, Register
+from plc_interface.registers.register import Kind, Register
 
 DEVICE = "FruitStation"
 DESIGNATORS = {
@@ -50,7 +50,7 @@ def _tag(register: Register) -> dict[str, Any]:
         "opcServer": "Ignition OPC UA Server",
         "opcItemPath": f"ns=1;s=[{DEVICE}]{designator}{register.address + 1}{length}",
         "dataType": data_type,
-        "readOnly": register.access is Access.READ_ONLY,
+        "readOnly": True,
         "engUnit": register.unit,
         "documentation": register.meaning,
     }

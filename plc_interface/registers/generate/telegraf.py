@@ -25,7 +25,7 @@ def telegraf() -> str:
     lines = [
         f"# {MADE_BY} {UNTESTED}",
         '# High word first; where the station is configured for the low word first write byte_order = "CDAB" and leave',
-        "# out the UINT64 fields.",
+        "# out the UINT64 fields. Telegraf 1.29 or newer: an older one refuses the whole file for its STRING fields.",
         "[[inputs.modbus]]",
         '  name = "fruit-station"',
         '  controller = "tcp://127.0.0.1:5020"',
@@ -51,4 +51,9 @@ def telegraf() -> str:
                 f'type = "{TYPES[register.kind]}"{length} }},'
             )
         lines.append("    ]")
+    texts = [register.name for group in GROUPS[1:] for register in group.registers if register.kind is Kind.TEXT]
+    lines += ["", "# Texts without the NULs that fill their registers", "[[processors.strings]]"]
+    lines.append('  namepass = ["fruit_station_*"]')
+    for name in texts:
+        lines += ["", "  [[processors.strings.trim_right]]", f'    field = "{name}"', '    cutset = "\\u0000"']
     return "\n".join([*lines, ""])
