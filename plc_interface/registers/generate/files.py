@@ -3,7 +3,9 @@
 from pathlib import Path
 
 from plc_interface.registers.generate import reference, structured_text
+from plc_interface.registers.generate.add_on_instruction import add_on_instruction
 from plc_interface.registers.generate.ignition import ignition
+from plc_interface.registers.generate.scl import s7_1500
 from plc_interface.registers.generate.structures import codesys, studio_5000
 from plc_interface.registers.generate.telegraf import telegraf
 from plc_interface.registers.generate.tia import tia
@@ -20,7 +22,9 @@ def made_files() -> dict[str, str]:
         "register-map.csv": reference.table(),
         "import/telegraf.conf": telegraf(),
         "import/tia-portal.scl": tia(),
+        "import/s7-1500.scl": s7_1500(),
         "import/studio-5000.L5X": studio_5000(),
+        "import/add-on-instruction.L5X": add_on_instruction(),
         "import/codesys-plcopen.xml": codesys(),
         "import/ignition-tags.json": ignition(),
         "structured-text/data_types.st": structured_text.data_types(),

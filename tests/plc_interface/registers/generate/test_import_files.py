@@ -10,8 +10,10 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from plc_interface.registers.alarms import ALARMS
+from plc_interface.registers.generate.add_on_instruction import add_on_instruction
 from plc_interface.registers.generate.ignition import ignition
 from plc_interface.registers.generate.reference import markdown, table
+from plc_interface.registers.generate.scl import s7_1500
 from plc_interface.registers.generate.structures import PLCOPEN, codesys, studio_5000
 from plc_interface.registers.generate.telegraf import telegraf
 from plc_interface.registers.generate.tia import tia
@@ -46,7 +48,8 @@ def test_the_document_names_every_register_bit_and_code():
 
 
 def test_telegraf_reads_every_block_but_the_control_block():
-    (plugin,) = tomllib.loads(telegraf())["inputs"]["modbus"]
+    whole = tomllib.loads(telegraf())
+    (plugin,) = whole["inputs"]["modbus"]
     fields = {field["name"]: field for request in plugin["request"] for field in request["fields"]}
     assert set(fields) == {register.name for group in GROUPS[1:] for register in group.registers}
     widths = {"16": 1, "32": 2, "64": 4}
@@ -60,12 +63,16 @@ def test_telegraf_reads_every_block_but_the_control_block():
         assert field["type"].startswith("INT") == (register.kind in SIGNED)
         assert field["type"].startswith("FLOAT") == (register.kind is Kind.F32)
     assert {request["byte_order"] for request in plugin["request"]} == {"ABCD"}
+    (strings,) = whole["processors"]["strings"]
+    texts = {name for name in fields if BY_NAME[name].kind is Kind.TEXT}
+    assert {trim["field"] for trim in strings["trim_right"] if trim["cutset"] == "\0"} == texts != set()
 
 
 def test_ignition_reads_every_register():
     root = json.loads(ignition())
     tags = {tag["name"]: tag for folder in root["tags"] for tag in folder["tags"]}
     assert set(tags) == set(BY_NAME)
+    assert all(tag["readOnly"] for tag in tags.values())
     widths = {"HR": 1, "HRUS": 1, "HRI": 2, "HRUI": 2, "HRF": 2, "HRUI_64": 4}
     for name, tag in tags.items():
         register = BY_NAME[name]
@@ -161,6 +168,8 @@ def test_structures_lie_as_the_registers_do(members_of, group):
             assert kind in {"INT", "DINT"}
 
 
-@pytest.mark.parametrize("text", [telegraf(), ignition(), tia(), studio_5000(), codesys()])
+@pytest.mark.parametrize(
+    "text", [telegraf(), ignition(), tia(), studio_5000(), codesys(), s7_1500(), add_on_instruction()]
+)
 def test_a_file_says_that_it_was_not_tried_in_the_tool(text):
     assert "Untested against the vendor's tool." in text

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from plc_interface.registers.generate.scl import s7_1500
 from plc_interface.registers.generate.structured_text import example, function_block
 from station.runtime.cycle.pacing import Pacing
 from station.settings.configuration import Configuration
@@ -26,6 +27,7 @@ def test_the_block_waits_longer_than_the_shipped_station_takes(recipe):
     deadline_s = Pacing(configuration, cell).limits(load_recipes()[recipe]).inspection_s
     result_deadline_ms = 1000 * (deadline_s + configuration.handshake.result_margin_s)
     assert result_deadline_ms == 15_300
-    for text in (function_block(), example()):
-        (time_out_s,) = re.findall(r"inspection_timeout [:A-Z ]*:= T#(\d+)s", text)
-        assert 1000 * (int(time_out_s) - MARGIN_S) > result_deadline_ms
+    for text in (function_block(), example(), s7_1500()):
+        times_out_s = re.findall(r"inspection_timeout [:A-Z ]*:= T#(\d+)s", text)
+        assert times_out_s
+        assert all(1000 * (int(time_out_s) - MARGIN_S) > result_deadline_ms for time_out_s in times_out_s)
