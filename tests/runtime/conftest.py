@@ -278,7 +278,15 @@ def bench(settings_file: Callable[..., Path]) -> Callable[..., contextlib.Abstra
 
 @contextlib.asynccontextmanager
 async def armed_interface(file: Path) -> AsyncIterator[StationClient]:
-    """`station plc run` with the patience of a busy machine, and a PLC that is armed."""
+    """`station plc run`, and a PLC that is armed."""
+    async with interface_at(file) as port, StationClient("127.0.0.1", port, timeout_s=10) as plc:
+        await plc.arm()
+        yield plc
+
+
+@contextlib.asynccontextmanager
+async def interface_at(file: Path) -> AsyncIterator[int]:
+    """`station plc run` with the patience of a busy machine; its port once it answers."""
     port = free_port()
     patience = {"BEGIN_DEADLINE_S": "2.5", "STATION_LOST_AFTER_S": "30", "PLC_HEARTBEAT_TIMEOUT_S": "30"}
     patient = {f"STATION_HANDSHAKE_{name}": value for name, value in patience.items()}
@@ -286,18 +294,22 @@ async def armed_interface(file: Path) -> AsyncIterator[StationClient]:
     command = (sys.executable, "-m", "station", "plc", "run", "--config", str(file))
     process = await asyncio.create_subprocess_exec(*command, env=environment)
     try:
-        async with contextlib.AsyncExitStack() as stack:
-            async with asyncio.timeout(60):
-                while True:
-                    with contextlib.suppress(UnreachableError):
-                        plc = await stack.enter_async_context(StationClient("127.0.0.1", port, timeout_s=10))
+        async with asyncio.timeout(60):
+            while True:
+                with contextlib.suppress(UnreachableError):
+                    async with StationClient("127.0.0.1", port, timeout_s=10):
                         break
-                    await asyncio.sleep(0.1)
-            await plc.arm()
-            yield plc
+                await asyncio.sleep(0.1)
+        yield port
     finally:
         process.terminate()
         await process.wait()
+
+
+@pytest.fixture
+def plc_port() -> Callable[[Path], contextlib.AbstractAsyncContextManager[int]]:
+    """`station plc run` for a station's settings, at a port, with no PLC yet."""
+    return interface_at
 
 
 @pytest.fixture

@@ -1,0 +1,85 @@
+"""The Structured Text's example as a PLC's program in a scan loop: Modbus TCP, interface, station and twin."""
+
+import asyncio
+import time
+
+import pytest
+from pymodbus.client import AsyncModbusTcpClient
+
+from plc_interface.registers.generate.structured_text import data_types, example, function_block
+from plc_interface.registers.map import BY_NAME, CONTROL, MORE_ALARMS, STATUS
+from tests.plc_interface.registers.generate.structured_text.conftest import Library
+
+FIRST, WORDS = STATUS[0].address, MORE_ALARMS[-1].end - STATUS[0].address
+SCAN_S = 0.02
+
+
+def program_for(station_is_simulated):
+    """The shipped text; a busy machine's heartbeats come late."""
+    text = example().replace("heartbeat_timeout := T#2s", "heartbeat_timeout := T#20s")
+    text = text.replace("answer_timeout := T#2s", "answer_timeout := T#20s")
+    if station_is_simulated:
+        text = text.replace("accept_simulated := FALSE", "accept_simulated := TRUE")
+    return Library(data_types(), function_block(), text)
+
+
+class Controller:
+    """A PLC's runtime: one exchange, one scan."""
+
+    def __init__(self, library, client):
+        self._library, self._client = library, client
+        self.program = library.unit("PRG_FruitStationExample")
+        self.block = self.program["fruit_station"]
+        library.now_s = time.monotonic()
+        self.program(exchange_ok=False)
+
+    async def scan(self, **inputs):
+        answer = await self._client.readwrite_registers(
+            read_address=FIRST, read_count=WORDS, write_address=CONTROL[0].address, values=self.program["sent"]
+        )
+        assert not answer.isError(), answer
+        self._library.now_s = time.monotonic()
+        self.program(received=answer.registers, exchange_ok=True, line_running=True, **inputs)
+        await asyncio.sleep(SCAN_S)
+
+    async def until(self, output, *, is_so, **inputs):
+        async with asyncio.timeout(60):
+            while self.block[output] != is_so:
+                await self.scan(**inputs)
+
+
+@pytest.mark.timeout(300)
+def test_three_fruits_by_the_shipped_program_and_one_that_a_simulated_station_may_not_let_pass(
+    bench, plc_port, settings_file
+):
+    # Parsed before, since that takes seconds, in which the station of this process would do nothing.
+    lenient, shipped = (program_for(station_is_simulated=simulated) for simulated in (True, False))
+
+    async def scenario():
+        file = settings_file()
+        async with bench(file) as cell, plc_port(file) as port:
+            await cell.choose("blueberry")
+            client = AsyncModbusTcpClient("127.0.0.1", port=port, timeout=10, retries=0)
+            assert await client.connect()
+            controller = Controller(lenient, client)
+            for number in (1, 2, 3):
+                await controller.until("ready", is_so=True, fruit_in_place=False)
+                await controller.until("done", is_so=True, fruit_in_place=True, line_encoder=number << 16)
+                result = controller.block["result"]
+                assert (controller.block["refused"], controller.block["timed_out"]) == (False, False)
+                assert (result["trigger_id"], result["encoder"]) == (number, number << 16)
+                passed = BY_NAME["result_outcome"].codes[result["outcome"]].name == "PASS"
+                assert controller.program["let_pass"] == passed
+                await controller.until("done", is_so=False, fruit_in_place=False)
+            client.close()
+
+            strict = AsyncModbusTcpClient("127.0.0.1", port=port, timeout=10, retries=0)
+            assert await strict.connect()
+            controller = Controller(shipped, strict)
+            await controller.until("ready", is_so=True, fruit_in_place=False)
+            await controller.until("done", is_so=True, fruit_in_place=True)
+            assert controller.block["result"]["simulated"]
+            assert not controller.program["let_pass"]
+            strict.close()
+
+    asyncio.run(scenario())
