@@ -59,7 +59,7 @@ MEANT: dict[str, tuple[str, ...]] = {
     ),
     "shot": ("docs/configuration.md", "station/twin/can/gate.py", "station/twin/can/line.py"),  # `can.shot_deadline_s`
     "sound diverted": ("README.md", "docs/sorting.md"),  # column headings of a result
-    "stands": ("docs/plc/handshake.md", "docs/robust-constants.md"),
+    "stands": ("docs/plc/handshake-table.md", "docs/robust-constants.md"),
     "witness": ("docs/robust-constants.md",),
 }
 """Files in which a word is meant literally, or is part of a published name."""

@@ -1,4 +1,4 @@
-"""docs/plc/handshake.md: the state table, drawn and printed. `python -m plc_interface.handshake.document`."""
+"""docs/plc/handshake-table.md: the state table, drawn and printed. `python -m plc_interface.handshake.document`."""
 
 from pathlib import Path
 
@@ -6,30 +6,26 @@ from plc_interface.handshake.modes import Mode
 from plc_interface.handshake.table import REGIONS
 from plc_interface.handshake.work import Row
 
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "plc" / "handshake.md"
-BEGIN = "<!-- table: made by python -m plc_interface.handshake.document -->\n"
-END = "<!-- end of table -->\n"
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "plc" / "handshake-table.md"
+_HEAD = """\
+# The handshake's table
+
+<!-- Made by python -m plc_interface.handshake.document -->
+
+Reference behind [the handshake](handshake.md): every mode and signal, generated from the code. The regions run in
+parallel. A signal goes to each region that lists it; of several rows for one mode and signal, the first whose condition
+is true applies. A pair that is in no row changes nothing, is counted and is logged.
+"""
 
 
-def document(around: str) -> str:
-    """Return the document with the present table.
-
-    Args:
-        around: the document; its text outside the marks is unchanged.
-    """
-    before, rest = around.split(BEGIN)
-    _, after = rest.split(END)
-    return f"{before}{BEGIN}{tables()}{END}{after}"
-
-
-def tables() -> str:
-    """Return a heading, a diagram and a table for each region."""
-    return "".join(_region(region, rows) for region, rows in REGIONS.items())
+def document() -> str:
+    """Return the document: a heading, a diagram and a table for each region."""
+    return _HEAD + "".join(_region(region, rows) for region, rows in REGIONS.items())
 
 
 def _region(region: type[Mode], rows: tuple[Row, ...]) -> str:
     purpose = (region.__doc__ or "").removesuffix(".")
-    lines = [f"\n### {region.__name__}: {purpose[0].lower()}{purpose[1:]}\n", *_diagram(rows), *_table(rows)]
+    lines = [f"\n## {region.__name__}: {purpose[0].lower()}{purpose[1:]}\n", *_diagram(rows), *_table(rows)]
     return "\n".join(lines) + "\n"
 
 
@@ -66,4 +62,4 @@ def _phrase(docstring: str | None) -> str:
 
 
 if __name__ == "__main__":
-    DOCUMENT.write_text(document(DOCUMENT.read_text(encoding="utf-8")), encoding="utf-8")
+    DOCUMENT.write_text(document(), encoding="utf-8")

@@ -43,7 +43,7 @@ def test_every_guard_and_effect_says_in_the_document_what_it_is():
 
 def test_the_document_shows_the_table_as_it_is():
     text = DOCUMENT.read_text(encoding="utf-8")
-    assert document(text) == text, "run python -m plc_interface.handshake.document"
+    assert document() == text, "run python -m plc_interface.handshake.document"
 
 
 def test_a_pair_that_is_not_listed_changes_nothing_and_is_counted(bench):
