@@ -19,6 +19,7 @@ from plc_interface.handshake.machine import step
 from plc_interface.handshake.state import restarted
 from plc_interface.handshake.view import view
 from plc_interface.registers.codec import WordOrder
+from plc_interface.registers.generate.scl import s7_1500
 from plc_interface.registers.generate.structured_text import function_block
 from plc_interface.registers.map import BY_NAME, REGISTERS
 from plc_interface.server.image import RegisterImage
@@ -181,7 +182,7 @@ def mbpoll() -> str:
 @pytest.fixture
 def vocabulary() -> set[str]:
     """Every name that a document may put into code."""
-    words = {*WordOrder, *re.findall(r"\w+", function_block())}
+    words = {*WordOrder, *re.findall(r"\w+", function_block() + s7_1500())}
     words |= {field for settings in (ModbusSettings, HandshakeSettings) for field in settings.model_fields}
     for register in REGISTERS:
         words |= {register.name, *(bit.name for bit in register.bits), *(code.name for code in register.codes.values())}

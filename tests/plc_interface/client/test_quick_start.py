@@ -65,7 +65,7 @@ def test_the_python_in_the_document_inspects_a_fruit(serve, capsys):
     assert capsys.readouterr().out == "PASS 12.34 []\n"
 
 
-@pytest.mark.parametrize("name", ["index.md", "integration.md", "quick-start.md"])
+@pytest.mark.parametrize("name", ["index.md", "integration.md", "quick-start.md", "in-sight.md"])
 def test_every_register_and_bit_that_a_document_names_is_in_the_map(name, vocabulary):
     text = (DOCUMENT.parent / name).read_text("utf-8")
     plain = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
