@@ -67,14 +67,14 @@ class Event(StrEnum):
     """A person at the panel says that the cell is safe and the jaws are clear."""
     RECOVERED = "recovered"
     FRUIT_HELD = "fruit_held"
-    """Reading the devices found something between the jaws away from the nest: a start after a crash while placing."""
+    """The process before ended with a judged fruit that may be between the jaws: see `hold_after`."""
 
 
 class Action(StrEnum):
     """What the service has to do, and the events that it ends with beside the faults."""
 
     READ_DEVICES = "read_devices"
-    """Read every device until all answer: READY, FRUIT_HELD, or the stop that stands."""
+    """Read every device until all answer: READY, or the stop that stands."""
     CLOSE_UNFINISHED = "close_unfinished"
     """Give every accepted trigger that has no durable outcome its NO_RESULT, durable, and publish every outcome that
     was not: UNFINISHED_CLOSED. Idempotent."""
@@ -153,7 +153,7 @@ class Row(NamedTuple):
 
 
 START = Transition(State.UNKNOWN, (Action.READ_DEVICES,))
-"""How a process begins: nothing is known of devices and fruit until they were read."""
+"""How a process begins where no hold was kept: nothing is known of devices and fruit until they were read."""
 
 REASONS: dict[Event, Reason] = {
     Event.NO_ONSET: Reason.NO_CONTACT,
@@ -192,10 +192,11 @@ BEFORE_LAST_IMAGE = (
 UNJUDGED = (*BEFORE_LAST_IMAGE, *CAPTURED_ALL)
 RECORDING = (S.RECORDING_ACCEPT, S.RECORDING_REJECT, S.RECORDING_RELEASE)
 PLACING = (S.PLACING_ACCEPT, S.PLACING_REJECT)
+STOPPED_FOR_A_PERSON = (S.RECORDING_LATCHED, S.LATCHED, S.RECOVERING)
 LEAVING = (S.RETREATING, S.RETREATING_READY)
 ACCEPTING = (S.ACCEPTING, S.RETREATING_ACCEPTING)
 UNRECORDED = (S.OPENING_UNRECORDED, S.HOMING_UNRECORDED)
-GETTING_READY = (S.CLEARING, S.OPENING_TO_CLEAR, S.RESETTING, S.HOMING, S.CHECKING)
+GETTING_READY = (S.CLEARING, S.RESETTING, S.HOMING, S.CHECKING)
 WAITING = (S.UNKNOWN, S.STOPPED, S.HELD, S.CARRIED, S.LATCHED)
 
 MOTION_FAULTS = (E.ARM_FAULT, E.GRIPPER_FAULT)
@@ -225,8 +226,7 @@ def _latched() -> Iterable[Row]:
 ROWS: tuple[Row, ...] = (
     # From a start, or after a fault, to the first trigger.
     Row((S.UNKNOWN, S.HELD), (E.READY,), S.CLEARING, (A.CLOSE_UNFINISHED,)),
-    Row((S.CLEARING,), (E.UNFINISHED_CLOSED,), S.OPENING_TO_CLEAR, (A.OPEN_JAWS,)),
-    Row((S.OPENING_TO_CLEAR,), (E.JAWS_OPEN,), S.STOPPED),
+    Row((S.CLEARING,), (E.UNFINISHED_CLOSED,), S.STOPPED),
     Row((S.STOPPED,), (E.RESET,), S.RESETTING, (A.OPEN_JAWS,)),
     Row((S.RESETTING,), (E.JAWS_OPEN,), S.HOMING, (A.GO_HOME,)),
     Row((S.HOMING,), (E.HOME,), S.CHECKING, (A.CHECK_DEVICES,)),
@@ -303,7 +303,7 @@ ROWS: tuple[Row, ...] = (
     Row((S.LATCHED,), (E.PERSON_CONFIRMED,), S.RECOVERING, (A.RECOVER_ARM,)),
     Row((S.RECOVERING,), (E.RECOVERED,), S.UNKNOWN, (A.READ_DEVICES,)),
     Row((S.RECOVERING,), (*MOTION_FAULTS, E.INTERNAL_FAULT), S.LATCHED),
-    Row((S.UNKNOWN, S.HELD), (E.FRUIT_HELD,), S.CARRIED, (A.HALT, Raise(AlarmId.FRUIT_HELD))),
+    Row((S.UNKNOWN,), (E.FRUIT_HELD,), S.CARRIED, (A.HALT, Raise(AlarmId.FRUIT_HELD))),
     Row((S.CARRIED,), (E.PERSON_CONFIRMED,), S.UNKNOWN, (A.READ_DEVICES,)),
     *_latched(),
     # What is expected and changes nothing: a wait is going on, or CHECKING will ask again.
@@ -314,7 +314,7 @@ ROWS: tuple[Row, ...] = (
     Row((S.RECORDING_HELD, S.RECORDING_LATCHED, S.OPENING_HELD, *UNRECORDED), (E.CAMERA_FAULT, E.STOP), None),
     Row((S.OPENING_HELD,), (E.ARM_FAULT,), None),
     Row((S.RECOVERING,), (E.CAMERA_FAULT, E.RECORDS_FAULT, E.STOP), None),
-    Row((S.CLEARING, S.OPENING_TO_CLEAR), (E.STOP,), None),
+    Row((S.CLEARING,), (E.STOP,), None),
     Row(RECORDING, (E.LATE,), None, (Raise(AlarmId.DEADLINE_MISSED),)),
 )
 
@@ -333,11 +333,35 @@ def _table(rows: Iterable[Row]) -> dict[tuple[State, Event], Transition]:
 TABLE: dict[tuple[State, Event], Transition] = _table(ROWS)
 
 
-class Cycle:
-    """One station's cycle: the state, and what was refused."""
+def hold_after(event: Event, state: State, before: Event | None, *, carries: bool) -> Event | None:
+    """What has to be durable before a state is shown, so that nothing but a person leads on, whatever is killed.
 
-    def __init__(self) -> None:
-        self.state = START.state
+    Args:
+        event: what led to the state.
+        before: what was durable until then.
+        carries: the arm carries judged fruit to their places; a killed process then leaves one between the jaws.
+
+    Returns:
+        The event that the next process begins with, in place of `START`; None where no person is needed.
+    """
+    if state is S.CARRIED or (carries and state in PLACING):
+        return E.FRUIT_HELD
+    if state in STOPPED_FOR_A_PERSON:
+        return event if event in LATCHES else before
+    return None
+
+
+class Cycle:
+    """One station's cycle: the state, and what was refused.
+
+    Args:
+        hold: what `hold_after` gave last in the process before.
+    """
+
+    def __init__(self, hold: Event | None = None) -> None:
+        self.begin = START if hold is None else TABLE[START.state, hold]
+        """Where it begins, and what is to be done first."""
+        self.state = self.begin.state
         self.refused: Counter[tuple[State, Event]] = Counter()
         """How often an event came in a state that has no row for it."""
 
@@ -346,13 +370,17 @@ class Cycle:
         """What the state means outside."""
         return STATES[self.state]
 
+    def leads_to(self, event: Event) -> Transition | None:
+        """Where an event would lead now, with nothing changed; None where it would be refused."""
+        return TABLE.get((self.state, event))
+
     def on(self, event: Event) -> tuple[Act, ...] | None:
         """Take an event; never raises.
 
         Returns:
             What is to be done, in this order; None where the event is refused, which is counted.
         """
-        transition = TABLE.get((self.state, event))
+        transition = self.leads_to(event)
         if transition is None:
             self.refused[self.state, event] += 1
             return None

@@ -74,7 +74,6 @@ _OPENING = (
     State.OPENING_AGAIN,
     State.RELEASING,
     State.RESETTING,
-    State.OPENING_TO_CLEAR,
     State.OPENING_HELD,
     State.OPENING_UNRECORDED,
 )

@@ -13,7 +13,6 @@ class State(StrEnum):
 
     UNKNOWN = "unknown"
     CLEARING = "clearing"
-    OPENING_TO_CLEAR = "opening_to_clear"
     STOPPED = "stopped"
     RESETTING = "resetting"
     HOMING = "homing"
@@ -98,7 +97,6 @@ STATES: dict[State, StateFacts] = {
         may_exit=True,
     ),
     State.CLEARING: _preparing(texts.CLEARING, PackmlState.CLEARING),
-    State.OPENING_TO_CLEAR: _preparing(texts.OPENING_TO_CLEAR, PackmlState.CLEARING),
     State.STOPPED: StateFacts(
         PackmlState.STOPPED,
         Refusal.NOT_READY,

@@ -8,7 +8,6 @@ UNKNOWN = define(
     "The state of devices and fruit is not known yet; the station continues once every device answers: see the alarms.",
 )
 CLEARING = define("state.clearing", "What was left open is closed with NO_RESULT and stored; wait a moment.")
-OPENING_TO_CLEAR = define("state.opening_to_clear", "The jaws open; wait a moment.")
 STOPPED = define("state.stopped", "The station is stopped; reset it by the PLC's command or at the panel.")
 RESETTING = define("state.resetting", "The jaws open before the arm goes home; wait a moment.")
 HOMING = define("state.homing", "The arm goes home; wait a moment.")

@@ -107,10 +107,12 @@ class Twin:
             UrcapServer(self.gripper, options.gripper.urcap.host, options.gripper.urcap.port),
             RtuOverTcpServer(self.gripper, options.gripper.modbus_rtu.host, options.gripper.modbus_rtu.port),
         ]
+        self._arm: UrController | None = None
         if not options.bench:
             self.boards["arm"] = arm_faults()
             arm = UrController(options.arm.host, clock, self.boards["arm"], polyscope=options.polyscope)
             self.world.sensor_mm = _beside_nest(arm, options.arm.poses)
+            self._arm = arm
             self._servers.append(arm)
         actions: dict[str, Action] = {"fruit": self._lay, "remove": self._remove, "state": self._state}
         if options.can.enabled:
@@ -182,6 +184,7 @@ class Twin:
             "width_mm": self.world.width_mm(self.world.opening_mm()),
             "closing_mm": max(0.0, squeezed.closing_mm),
             "force_n": squeezed.force_n,
+            "arm_rad": None if self._arm is None else list(self._arm.joints_rad),
         }
 
 

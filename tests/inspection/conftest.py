@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from station.inspection.cycle import LATCHES, START, TABLE, Act, Action, Event, Raise
+from station.inspection.cycle import LATCHES, START, TABLE, Act, Action, Cycle, Event, Raise, hold_after
 from station.inspection.states import State
 
 JAWS_CLOSE = {Action.CLOSE_TO_ONSET, Action.CLOSE_STEP}
@@ -21,6 +21,8 @@ class World:
     jaws_open: bool = False
     """Known to be open, and nothing has closed them since."""
     stopped_for_a_person: bool = False
+    hold: Event | None = None
+    """Kept for the next start."""
     accepted: int = 0
     """Triggers accepted and not answered with an outcome."""
     recorded: bool = False
@@ -52,7 +54,8 @@ def after(world: World, event: Event) -> World | None:
         world = replace(world, jaws_open=False)
     for action in transition.actions:
         world = carried_out(world, action, event)
-    return replace(world, state=transition.state)
+    hold = hold_after(event, transition.state, world.hold, carries=True)
+    return replace(world, state=transition.state, hold=hold)
 
 
 def carried_out(world: World, action: Act, event: Event) -> World:
@@ -78,7 +81,13 @@ def carried_out(world: World, action: Act, event: Event) -> World:
 
 def killed(world: World) -> World:
     """The process ended with SIGKILL and was started again: what is durable and what is real stays."""
-    return World(stopped_for_a_person=world.stopped_for_a_person, accepted=world.accepted, recorded=world.recorded)
+    return World(
+        state=Cycle(world.hold).state,
+        stopped_for_a_person=world.stopped_for_a_person,
+        hold=world.hold,
+        accepted=world.accepted,
+        recorded=world.recorded,
+    )
 
 
 def neighbours(world: World) -> Iterator[tuple[str, World]]:

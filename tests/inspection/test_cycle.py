@@ -6,7 +6,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from station.inspection.cycle import LATCHES, REASONS, ROWS, START, TABLE, Action, Cycle, Event, Raise
+from station.inspection.alarm_table import AlarmId
+from station.inspection.cycle import (
+    LATCHES,
+    REASONS,
+    ROWS,
+    START,
+    STOPPED_FOR_A_PERSON,
+    TABLE,
+    Action,
+    Cycle,
+    Event,
+    Raise,
+    hold_after,
+)
 from station.inspection.states import STATES, State
 from station.vocabulary import PackmlState, Refusal
 
@@ -102,8 +115,7 @@ def test_a_fruit_away_from_its_place_is_taken_out_by_a_person():
     for state in (State.PLACING_ACCEPT, State.PLACING_REJECT):
         for event in (Event.ARM_FAULT, Event.GRIPPER_FAULT, Event.INTERNAL_FAULT):
             assert TABLE[state, event].state == State.CARRIED
-    for state in (State.UNKNOWN, State.HELD):
-        assert TABLE[state, Event.FRUIT_HELD].state == State.CARRIED
+    assert Cycle(hold=Event.FRUIT_HELD).state == State.CARRIED
     leaving = {e for (s, e), t in TABLE.items() if s == State.CARRIED and t.state not in (State.CARRIED, State.LATCHED)}
     assert leaving == {Event.PERSON_CONFIRMED}
 
@@ -135,7 +147,7 @@ def test_an_orderly_stop_ends_everywhere_without_a_person(cycle_model):
 
 
 GOOD = [
-    Event.READY, Event.UNFINISHED_CLOSED, Event.JAWS_OPEN, Event.RESET, Event.JAWS_OPEN, Event.HOME, Event.READY,
+    Event.READY, Event.UNFINISHED_CLOSED, Event.RESET, Event.JAWS_OPEN, Event.HOME, Event.READY,
     Event.TRIGGER, Event.TRIGGER_RECORDED, Event.JAWS_OPEN, Event.ARRIVED, Event.ONSET_FOUND, Event.REACHED,
     Event.SETTLED, Event.CAPTURED, Event.REACHED, Event.MEASURED, Event.SETTLED, Event.LAST_CAPTURED, Event.MEASURED,
     Event.JUDGED_ACCEPT, Event.RECORDED, Event.PLACED, Event.HOME, Event.READY,
@@ -199,6 +211,27 @@ def test_any_events_are_taken_without_an_error_and_the_unlisted_are_counted(even
             refused += 1
             assert cycle.state == before
     assert cycle.refused.total() == refused
+
+
+def test_a_start_begins_with_what_only_a_person_may_end():
+    for event, alarm in {**LATCHES, Event.FRUIT_HELD: AlarmId.FRUIT_HELD}.items():
+        cycle = Cycle(hold=event)
+        assert cycle.facts.needs_person, event
+        assert cycle.begin.actions == (Action.HALT, Raise(alarm))
+
+
+def test_what_needs_a_person_is_held_before_it_is_shown_and_until_the_person_ends_it():
+    for (state, event), transition in TABLE.items():
+        hold = hold_after(event, transition.state, None, carries=True)
+        if STATES[transition.state].needs_person and state not in STOPPED_FOR_A_PERSON:
+            assert hold is not None, (state, event)
+            assert STATES[Cycle(hold).state].needs_person
+    assert hold_after(Event.RECORDED, State.PLACING_ACCEPT, None, carries=True) == Event.FRUIT_HELD
+    assert hold_after(Event.RECORDED, State.PLACING_ACCEPT, None, carries=False) is None
+    assert hold_after(Event.ARM_FAULT, State.CARRIED, None, carries=False) == Event.FRUIT_HELD
+    assert hold_after(Event.EMERGENCY_STOP, State.LATCHED, Event.FRUIT_HELD, carries=True) == Event.EMERGENCY_STOP
+    for left in (State.UNKNOWN, State.RETREATING_READY):
+        assert hold_after(Event.PERSON_CONFIRMED, left, Event.FRUIT_HELD, carries=True) is None
 
 
 def test_the_start_knows_nothing():

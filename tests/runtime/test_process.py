@@ -1,4 +1,4 @@
-"""The station as a process of its own on a whole simulated cell: killed, told to end, stopped by the arm."""
+"""The station as a process of its own on a whole simulated cell: killed, told to end, stopped by arm or person."""
 
 import asyncio
 import contextlib
@@ -10,8 +10,11 @@ import pytest
 
 from station.channel.client import ChannelClient
 from station.channel.line import CommandName, PackmlState
-from station.messages import commands
+from station.channel.panel import Actor
+from station.channel.panel_live import OperatorCommand, OperatorCommandName, OperatorCommandView
+from station.messages import commands, states
 from station.settings.configuration import load_configuration
+from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
 from station.twin.console import ask
 from station.vocabulary import Reason
@@ -20,14 +23,14 @@ from station.vocabulary import Reason
 @pytest.fixture
 def cell(settings_file, line_client):
     """A twin with an arm; starts and ends the station's processes."""
-    file = settings_file(bench=False)
+    file = settings_file(bench=False, placing="arm")
 
     class Cell:
         def __init__(self):
             self.twin = self.start("twin", "--fruit", "blueberry", "--console", "0")
             lines = self.twin.stdout or ()
             self.console = next(int(line.split(":")[1]) for line in lines if line.startswith("console"))
-            self.started = [self.twin]
+            self.started, self.file = [self.twin], file
 
         def start(self, *arguments):
             command = [sys.executable, "-m", "station", *arguments, "--config", str(file)]
@@ -41,9 +44,8 @@ def cell(settings_file, line_client):
             assert any(line.startswith("running") for line in process.stdout), process.stderr.read()
             return process
 
-        def fault(self, device, fault):
-            for do in ("set", "clear"):
-                ask("127.0.0.1", self.console, {"do": do, "device": device, "fault": fault, "amount": 1.0})
+        def twin_is(self, **request):
+            return ask("127.0.0.1", self.console, request)
 
         def recover(self, what):
             with self.start("devices", "recover", what, "--yes") as process:
@@ -95,7 +97,8 @@ def test_a_killed_a_stopped_and_an_ended_station_lose_and_double_nothing(cell):
 
             stopped = await line.begin()
             assert stopped.sequence == begun.sequence + 1
-            cell.fault("arm", "protective_stop")
+            for do in ("set", "clear"):
+                cell.twin_is(do=do, device="arm", fault="protective_stop", amount=1.0)
             outcome = await line.outcome(stopped.sequence)
             assert (outcome.outcome, outcome.reasons[0]) == ("NO_RESULT", Reason.ARM_FAULT)
             await line.publish(outcome)
@@ -122,3 +125,77 @@ def test_a_killed_a_stopped_and_an_ended_station_lose_and_double_nothing(cell):
     _, log = second.communicate(timeout=60)
     assert second.returncode == 0, log
     assert "Traceback" not in log
+
+
+async def stop_at_the_panel(file):
+    configuration = load_configuration(file, {})
+    order = OperatorCommand(person=Actor(who="Olga", role="operator"), order=OperatorCommandName.STOP)
+    async with ChannelClient(panel_endpoint(configuration.hmi, configuration.home), "the station") as panel:
+        return await panel.request(order, OperatorCommandView, deadline_s=20)
+
+
+@pytest.mark.timeout(400)
+def test_what_only_a_person_may_end_outlives_kills_and_nothing_moves_meanwhile(cell):
+    """A fruit that the arm carries, a safety stop that is confirmed while nobody watches, a person's stop."""
+
+    async def kill_while_carrying(service):
+        async with cell.line() as line:
+            assert (await line.order(CommandName.CHANGE_RECIPE, 2)).done
+            await line.ready()
+            begun = await line.begin()
+            cell.twin_is(do="set", device="arm", fault="slow", amount=4.0)
+            outcome = await line.outcome(begun.sequence)
+            service.kill()
+            service.wait()
+            cell.twin_is(do="clear", device="arm", fault="slow")
+            return outcome
+
+    async def is_held(packml, why):
+        """The same state for a while, in which neither arm nor jaws move; then it may be killed again."""
+        async with cell.line() as line:
+            async with asyncio.timeout(60):
+                while (await line.state()).packml_state is not packml:
+                    await asyncio.sleep(0.05)
+            before = cell.twin_is(do="state")
+            await asyncio.sleep(2.0)
+            state, after = await line.state(), cell.twin_is(do="state")
+            assert (state.packml_state, state.why_not_ready) == (packml, why)
+            assert before["arm_rad"] == pytest.approx(after["arm_rad"], abs=1e-4)
+            assert before["width_mm"] == pytest.approx(after["width_mm"], abs=0.01)
+            return after
+
+    async def reset(publish=None):
+        async with cell.line() as line:
+            if publish is not None:
+                await line.publish(publish)
+            done = await line.order(CommandName.RESET)
+            assert done.done, done.why
+            await line.ready()
+
+    outcome = asyncio.run(kill_while_carrying(cell.service()))
+    for _ in range(2):
+        service = cell.service()
+        held = asyncio.run(is_held(PackmlState.HELD, states.CARRIED()))
+        assert held["width_mm"] < 40, "the fruit is between the jaws"
+        service.kill()
+        service.wait()
+    service = cell.service()
+    cell.twin_is(do="remove")
+    asyncio.run(reset(outcome))
+
+    cell.twin_is(do="set", device="arm", fault="protective_stop", amount=1.0)
+    asyncio.run(is_held(PackmlState.ABORTED, states.LATCHED()))
+    service.kill()
+    service.wait()
+    cell.twin_is(do="clear", device="arm", fault="protective_stop")
+    assert cell.recover("protective-stop") == 0
+    service = cell.service()
+    asyncio.run(is_held(PackmlState.ABORTED, states.LATCHED()))
+    asyncio.run(reset())
+
+    assert asyncio.run(stop_at_the_panel(cell.file)).state == "done"
+    service.kill()
+    service.wait()
+    service = cell.service()
+    asyncio.run(is_held(PackmlState.STOPPED, states.STOPPED()))
+    asyncio.run(reset())

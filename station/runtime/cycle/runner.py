@@ -10,7 +10,7 @@ from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import CameraError
 from station.devices.gripper.errors import GripperEmergencyStopError, GripperError
 from station.errors import StationError
-from station.inspection.cycle import START, Act, Action, Cycle, Event, Raise
+from station.inspection.cycle import Act, Action, Cycle, Event, Raise
 from station.inspection.states import State
 from station.messages import operation as messages
 from station.messages.message import Message, message_of
@@ -81,6 +81,14 @@ class Performer(Protocol):
         """Stop the devices where they are; bounded, and raises nothing."""
         ...
 
+    def storing(self, event: Event, state: State) -> Awaitable[None] | None:
+        """Give what has to be durable before a state is shown; None where nothing changes.
+
+        Args:
+            event: which leads to the state.
+        """
+        ...
+
     def raise_alarm(self, told: Raise, why: Message | None) -> None:
         """Raise an alarm.
 
@@ -118,10 +126,11 @@ class CycleRunner:
 
     Args:
         performer: who carries the actions out.
+        hold: what only a person may end, from the start before.
     """
 
-    def __init__(self, performer: Performer) -> None:
-        self.cycle = Cycle()
+    def __init__(self, performer: Performer, hold: Event | None = None) -> None:
+        self.cycle, self._hold = Cycle(hold), hold
         self.entered_s = time.monotonic()
         """When the present state was entered, monotonic."""
         self._performer = performer
@@ -151,7 +160,7 @@ class CycleRunner:
     async def run(self) -> None:
         """Take events until cancelled; then what is under way is cancelled too."""
         try:
-            await self._act(START.actions, Happened(Event.RESET, None, None))
+            await self._act(self.cycle.begin.actions, Happened(self._hold or Event.RESET, None, None))
             while True:
                 try:
                     async with asyncio.timeout(TICK_S):
@@ -180,6 +189,7 @@ class CycleRunner:
             return  # its action was halted
         if happened.by is not None:
             del self._doing[happened.by]
+        halted = await self._store(happened.event)
         before, actions = self.state, self.cycle.on(happened.event)
         if actions is None:
             log.warning("event %s is not expected in %s: %s", happened.event, before, happened.why or "no reason given")
@@ -190,15 +200,28 @@ class CycleRunner:
             took_s, self.entered_s = now_s - self.entered_s, now_s
             log.debug("%s → %s on %s", before, self.state, happened.event)
             self._performer.entered(self.state, before, took_s)
-        await self._act(actions, happened)
+        await self._act(actions, happened, halted=halted)
         self._changed.set()
 
-    async def _act(self, actions: tuple[Act, ...], because: Happened) -> None:
+    async def _store(self, event: Event) -> bool:
+        """Make durable what only a person may end, before the state that says so; whether HALT was carried out."""
+        transition = self.cycle.leads_to(event)
+        storing = None if transition is None else self._performer.storing(event, transition.state)
+        if transition is None or storing is None:
+            return False
+        if Action.HALT not in transition.actions:
+            await storing
+            return False
+        await asyncio.gather(storing, self._halt())  # no motion waits for the disk
+        return True
+
+    async def _act(self, actions: tuple[Act, ...], because: Happened, *, halted: bool = False) -> None:
         for act in actions:
             if isinstance(act, Raise):
                 self._performer.raise_alarm(act, because.why)
             elif act is Action.HALT:
-                await self._halt()
+                if not halted:
+                    await self._halt()
             else:
                 self._begin(act, because)
 

@@ -19,6 +19,7 @@ from station.records.records import Records
 from station.runtime.alarms.manager import AlarmManager
 from station.runtime.alarms.outcome_monitor import OutcomeMonitor
 from station.runtime.cycle.actions import Inspector
+from station.runtime.cycle.hold import Hold
 from station.runtime.cycle.inspection import Inspection, utc_ms
 from station.runtime.cycle.pacing import RECORD_NO_RESULT_S, Pacing, late_now
 from station.runtime.cycle.recent_triggers import PendingTrigger, RecentTriggers
@@ -27,6 +28,7 @@ from station.runtime.cycle.runner import CycleRunner, Happened, Work, event_of
 from station.runtime.devices.manager import DeviceManager
 from station.runtime.observability.observability import Observability
 from station.runtime.recipes.active import ActiveRecipe
+from station.runtime.state_files import StateFiles
 from station.settings.configuration import Configuration
 from station.vocabulary import Refusal
 
@@ -57,13 +59,14 @@ class Service:
         self._resolution_mm = configuration.gripper.calibration.mm_per_count
         self._devices, self._inspector = devices, inspector
         self.alarms, self._metrics, self._liveness = alarms, observability.metrics, observability.liveness
-        self.runner = CycleRunner(self)
+        carries = self._settings.placing == "arm" and not self._settings.bench
+        self._hold = Hold(StateFiles(configuration.home), carries=carries)
+        self.runner = CycleRunner(self, self._hold.event)
         self.triggers = RecentTriggers()
         self.registry = InspectionRegistry(records, self.triggers, devices, observability.versions)
         self.pacing = Pacing(configuration, devices.cell)
         self._active: ActiveRecipe | None = None
-        self._reset_wanted = self._settings.automatic_reset
-        """Whether a stopped station makes itself ready."""
+        self._reset_wanted = self._settings.automatic_reset and self._hold.event is None
         self._ending, self._stopped_by_person = False, False
         self._on_published: Callable[[Outcome], None] = lambda _: None
         self._pending: PendingTrigger | None = None
@@ -129,6 +132,11 @@ class Service:
     def end(self) -> None:
         """Accept no trigger any more: the process is about to end."""
         self._ending = True
+
+    @property
+    def makes_itself_ready(self) -> bool:
+        """Return whether anything may move between fruits without a person's or the PLC's reset."""
+        return self._reset_wanted and not (self._ending or self._stopped_by_person)
 
     @property
     def stopped_by_person(self) -> bool:
@@ -231,6 +239,10 @@ class Service:
         """Stop the devices where they are."""
         await self._devices.halt()
 
+    def storing(self, event: Event, state: State) -> Awaitable[None] | None:
+        """Give the write of a hold that a state begins or ends."""
+        return self._hold.store() if self._hold.changes(event, state) else None
+
     def raise_alarm(self, told: Raise, why: Message | None) -> None:
         """Raise an alarm of the cycle."""
         self.alarms.raise_(told.alarm, why)
@@ -257,7 +269,7 @@ class Service:
         if state is State.IDLE:
             self._reset_wanted = self._settings.automatic_reset
             self.alarms.clear(AlarmId.FRUIT_HELD)
-        if state is State.STOPPED and self._reset_wanted and not (self._ending or self._stopped_by_person):
+        if state is State.STOPPED and self.makes_itself_ready:
             self.runner.post(Event.RESET)
 
     def tick(self) -> None:

@@ -101,7 +101,9 @@ class Housekeeping:
 
     async def _try_recovery(self) -> None:
         """Try to recover what is faulty, with growing pauses; its monitor reports why a recovery failed."""
-        activate = self._activation_is_lost and set(self._devices.faults) == {GRIPPER}
+        activate = (
+            self._service.makes_itself_ready and self._activation_is_lost and set(self._devices.faults) == {GRIPPER}
+        )
         play = self._devices.needs_program_restart and not self._liveness.stuck()
         if time.monotonic() < self._again_s or not (activate or play or self._service.registry.fault is not None):
             return

@@ -31,6 +31,7 @@ log = logging.getLogger(__name__)
 DEADLINE_S = 25.0
 """Less than the PLC interface's own deadline for a command."""
 LINE_SILENT_S = 2.0
+STOP_WITHIN_S = 0.5
 MODES = (1, 2, 3)
 _STOPPED = "stopped_by_a_person"
 _ON_ALARMS = {CommandName.CLEAR_ALARMS: "acknowledged", CommandName.RESET: "reset"}
@@ -240,14 +241,15 @@ class PlcCommands:
             Why the stop is not complete; None if it is.
         """
         service = self._service
+        storing = asyncio.create_task(asyncio.to_thread(self._state_files.write, _STOPPED, b"yes"))
+        await asyncio.wait({storing}, timeout=STOP_WITHIN_S)  # durable before it is shown, but no disk delays a stop
         service.stop()
-        kept = await asyncio.to_thread(self._state_files.write, _STOPPED, b"yes")
         if service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
             service.runner.post(Event.STOP, operation.STOPPED_AT_PANEL())
         reached = await service.runner.until(lambda state: state in WAITING or not service.stopped_by_person)
         if reached not in WAITING:
             return messages.STARTED_MEANWHILE()
-        if kept:
+        if await storing:
             return None
         return messages.STOP_NOT_STORED()
 
