@@ -4,11 +4,12 @@ from pathlib import Path
 
 import click
 
+from station.commands.records_options import proof_options
 from station.errors import BadInputError
-from station.records.audit_check import check_audit
-from station.records.audit_head import Head, read_head
+from station.records.audit_check import Proof, check_trail
 from station.records.audit_report import format_rows, read_audit
 from station.records.database import reading, records_folder
+from station.records.signing import PUBLIC_NAME
 from station.settings.configuration import load_configuration
 
 _config = click.option(
@@ -36,35 +37,30 @@ def show(last: int, action: str, subject: str, config: Path | None) -> None:
 
 
 @audit.command()
-@click.option(
-    "--anchor", "anchors", multiple=True, metavar="ROW:HASH", help="A row known from elsewhere, as from a backup."
-)
-@click.option(
-    "--since", default=0, metavar="ROW", type=click.IntRange(0), help="Leave out rows before it: a known break."
-)
+@proof_options
 @_config
 @click.pass_context
-def verify(context: click.Context, anchors: tuple[str, ...], since: int, config: Path | None) -> None:
+def verify(context: click.Context, proof: Proof, config: Path | None) -> None:
     """Check that no row was changed, removed or inserted; exit code 1 if one was.
 
-    Rows cut off at the end are found by the head that is stored beside the database, and by any ROW:HASH that this
-    command printed before and a person stored elsewhere.
+    Rows cut off at the end are found by the signed head that is stored beside the database, and by any
+    ROW:HASH:SIGNATURE that this command printed before and a person stored elsewhere.
     """
-    folder, known = records_folder(load_configuration(config).home), [_anchor(text) for text in anchors]
-    with reading(folder) as connection:
-        found = check_audit(connection, read_head(folder), known, since)
-    for text in found.restored:
+    found = check_trail(records_folder(load_configuration(config).home), proof)
+    for text in found.notes:
         click.echo(f"note {text}", err=True)
     for text in found.broken:
         click.echo(f"BROKEN {text}", err=True)
     if found.broken:
         context.exit(1)
-    head = "" if found.head is None else f", the last one is {found.head.seq}:{found.head.hash}"
-    click.echo(f"OK {found.rows} rows{head}")
+    click.echo(f"OK {found.rows} rows" + ("" if found.head is None else f", the last one is {found.head}"))
 
 
-def _anchor(text: str) -> Head:
-    number, _, digest = text.partition(":")
-    if not number.isascii() or not number.isdigit() or len(digest) != 64:
-        raise BadInputError(f"--anchor: expected ROW:HASH as `station audit verify` prints it, got {text!r:.100}")
-    return Head(int(number), digest.lower())
+@audit.command("public-key")
+@_config
+def public_key(config: Path | None) -> None:
+    """Print the public part of the station's signing key: store it elsewhere, to check copies and backups by it."""
+    path = records_folder(load_configuration(config).home) / PUBLIC_NAME
+    if not path.exists():
+        raise BadInputError(f"{path}: there is none; the station makes its key when it starts")
+    click.echo(path.read_text(encoding="ascii", errors="replace"), nl=False)

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import click
 
-from station.commands.records_options import by_option, config_option, folder_of
+from station.commands.records_options import by_option, config_option, folder_of, proof_options, public_keys_option
 from station.errors import StationError
 from station.records.audit import AuditEntry, append_audit
+from station.records.audit_check import Proof
 from station.records.backup import make_backup
 from station.records.database import reading
 from station.records.holds import hold as place_hold
@@ -17,6 +18,7 @@ from station.records.integrity_check import check_records
 from station.records.lots import Lot, end_lot, read_lots, start_lot
 from station.records.restore import restore_backup
 from station.records.short_transaction import short_transaction
+from station.records.signing import public_keys_of
 from station.records.texts import printable
 
 _ROLE = "command line"
@@ -133,23 +135,37 @@ def backup(directory: Path, config: Path | None) -> None:
 @click.command()
 @click.argument("directory", metavar="DIR", type=click.Path(path_type=Path))
 @by_option
+@public_keys_option
+@click.option(
+    "--unverified",
+    is_flag=True,
+    help="Restore a backup without checking who made it: what was changed in it is then not found.",
+)
 @config_option
-def restore(directory: Path, by: str, config: Path | None) -> None:
-    """Replace the records by the backup in DIR, while no station runs. The present records are moved aside."""
-    restored = restore_backup(folder_of(config), directory, by)
+def restore(directory: Path, by: str, public_keys: tuple[Path, ...], *, unverified: bool, config: Path | None) -> None:
+    """Replace the records by the backup in DIR, while no station runs. The present records are moved aside.
+
+    The backup has to be signed by this station, or by the one whose public key is given.
+    """
+    folder = folder_of(config)
+    keys = None if unverified else public_keys_of(folder, public_keys)
+    restored = restore_backup(folder, directory, by, keys)
     click.echo(f"restored {restored.inspections} inspections and {restored.images} images from {directory}")
     if restored.aside is not None:
         click.echo(f"what was there is in {restored.aside}")
 
 
 @click.command()
+@proof_options
 @config_option
-def check(config: Path | None) -> None:
+def check(proof: Proof, config: Path | None) -> None:
     """Check the whole database, and every image against its name, also while the station runs; exit code 1 for faults.
 
-    It changes nothing. The station's next start repairs files without a row and rows without a file.
+    Finds what was changed, removed or added by others than the station: in the database's schema and triggers, in the
+    audit trail, and in the inspections and images that it seals. It changes nothing. The station's next start repairs
+    files without a row and rows without a file.
     """
-    found = check_records(folder_of(config))
+    found = check_records(folder_of(config), proof)
     for fault in found.faults:
         click.echo(f"fault: {fault}")
     for note in found.notes:

@@ -9,8 +9,12 @@ from typing import Any
 import click
 
 from station.channel.line import Reason
+from station.errors import BadInputError
+from station.records.audit_check import Proof
+from station.records.audit_head import Head
 from station.records.database import records_folder
 from station.records.search import Query
+from station.records.signing import read_public_key
 from station.settings.configuration import load_configuration
 
 config_option = click.option(
@@ -28,6 +32,16 @@ def folder_of(config: Path | None) -> Path:
         config: the file that the user named.
     """
     return records_folder(load_configuration(config).home)
+
+
+public_keys_option = click.option(
+    "--public-key",
+    "public_keys",
+    multiple=True,
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="The station's public key, stored elsewhere, or one that it had before. [default: that of these records]",
+)
 
 
 class Moment(click.ParamType):
@@ -91,3 +105,43 @@ def by_option(command: Callable[..., Any]) -> Callable[..., Any]:
     return click.option(
         "--by", metavar="WHO", default=getpass.getuser, help="Who does it, for the audit trail. [default: your login]"
     )(command)
+
+
+def proof_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add what a person knows from elsewhere of the audit trail, passed as `proof`."""
+
+    def gathered(*, anchors: tuple[str, ...], public_keys: tuple[Path, ...], since: int, **others: Any) -> Any:
+        heads = tuple(_anchor(text) for text in anchors)
+        if public_keys and not all(head.signature for head in heads):
+            raise BadInputError("--anchor: with --public-key an anchor needs its signature: ROW:HASH:SIGNATURE")
+        return command(proof=Proof(heads, tuple(map(read_public_key, public_keys)), since), **others)
+
+    gathered.__name__, gathered.__doc__ = command.__name__, command.__doc__
+    gathered.__click_params__ = getattr(command, "__click_params__", [])  # type: ignore[attr-defined] (click's own)
+    options = (
+        click.option(
+            "--anchor",
+            "anchors",
+            multiple=True,
+            metavar="ROW:HASH:SIGNATURE",
+            help="A row known from elsewhere, as from a backup or from this command.",
+        ),
+        public_keys_option,
+        click.option(
+            "--since", default=0, metavar="ROW", type=click.IntRange(0), help="Leave out rows before it: a known break."
+        ),
+    )
+    decorated: Callable[..., Any] = gathered
+    for option in reversed(options):
+        decorated = option(decorated)
+    return decorated
+
+
+def _anchor(text: str) -> Head:
+    number, _, rest = text.partition(":")
+    digest, _, signature = rest.partition(":")
+    if not number.isascii() or not number.isdigit() or len(digest) != 64:
+        raise BadInputError(
+            f"--anchor: expected ROW:HASH:SIGNATURE as `station audit verify` prints it, got {text!r:.100}"
+        )
+    return Head(int(number), digest.lower(), signature)

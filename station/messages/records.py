@@ -131,6 +131,8 @@ AUDIT_TEXT = define(
     text=Name(),
 )
 
+NO_SIGNING_KEY = define("records.no_signing_key", "{path}: this is no Ed25519 key in PEM form", path=Name())
+
 # Images.
 IMAGES_PENDING = define("records.images_pending", "waiting for the disk")
 IMAGES_KEPT = define("records.images_kept", "kept")
@@ -187,6 +189,20 @@ OTHER_CONTENT = define(
 NOT_THE_VERIFIED = define(
     "records.not_the_verified", "{path} is missing, or not the one that was verified", path=Name()
 )
+NO_SUCH_FILE = define(
+    "records.no_such_file", "{path}: this is no file, or larger than {most} bytes", path=Name(), most=Number(0)
+)
+BACKUP_UNSIGNED = define(
+    "records.backup_unsigned",
+    "{path} is not signed: a version before the signatures made it, or somebody removed the signature",
+    path=Name(),
+)
+BACKUP_OTHER_KEY = define(
+    "records.backup_other_key",
+    "{path} is not signed by the key {keys}: it was changed, or another station made it",
+    path=Name(),
+    keys=Name(),
+)
 IMAGE_MISSING = define("records.image_missing", "{path}: the image {image} is missing", path=Name(), image=Name())
 NO_SPACE_FOR_BACKUP = define(
     "records.no_space_for_backup",
@@ -230,6 +246,7 @@ GIVE_HOME = define("records.give_home", "give the station's home folder, or let 
 OPEN_FIRST = define("records.open_first", "open them first")
 CHECK_DISK = define("records.check_disk", "check the disk, or raise records.deadline_s")
 CHECK_DISK_AND_REPEAT = define("records.check_disk_and_repeat", "check the disk, or ask again")
+USE_NEWER = define("records.use_newer", "use the version that made it")
 INSTALL_NEWER = define(
     "records.install_newer",
     "install that version again, or put back the copy in {folder} that this version made",
@@ -242,6 +259,10 @@ INSTALL_EARLIER_COPY = define(
     "records.install_earlier_copy",
     "it is as it was; install the earlier version again and report this; a copy of it is {path}",
     path=Name(),
+)
+REPLACE_KEY = define(
+    "records.replace_key",
+    "put back the file, or remove it: then a new key is made, and the public part that you keep elsewhere changes",
 )
 PUT_BACK_BACKUP = define("records.put_back_backup", "put back a backup")
 LIST_SHOWS = define("records.list_shows", "`station records list` shows what there is")
@@ -280,3 +301,8 @@ RUN_CHECK_KEEP = define("records.run_check_keep", "run `station records check`; 
 NEW_FOLDER = define("records.new_folder", "name a new folder; a backup never changes another one")
 NAME_BACKUP = define("records.name_backup", "name a folder that `station records backup` made")
 TAKE_ANOTHER = define("records.take_another", "take another backup: this one is not whole")
+TRUST_BACKUP = define(
+    "records.trust_backup",
+    "give the public key of the station that made it by --public-key; or, only if nobody else could write to it, "
+    "restore it by --unverified: results that were changed in it are then not found",
+)

@@ -10,14 +10,16 @@ from sqlalchemy import Connection, Row, insert, select
 from station.messages import records as messages
 from station.records.audit_head import FILE_NAME as HEAD_NAME
 from station.records.audit_head import Head
+from station.records.clock import utc_ms
 from station.records.errors import BadRecordError
 from station.records.schema import audit
-from station.records.write_requests import utc_ms
 
 GENESIS = "0" * 64
 """The very first row's value for the hash of the row before."""
 CONTINUED = "audit.continued"
 """Action of a row that records that rows before it are missing from this database."""
+UNSIGNED = "audit.unsigned"
+"""Action of a row that records that the rows before it were found without a signed head, as after a killed station."""
 RESTORED = "records.restored"
 """Action of a row that records the restore of a backup; rows written since that backup are missing before it."""
 STATION = "station"
@@ -106,9 +108,20 @@ def continue_audit(connection: Connection, known: Head | None) -> AuditRow | Non
         reason = f"{HEAD_NAME} is missing or unreadable: whether these are the last rows of the trail is not known"
     else:
         reason = "the last rows of the trail are not in this database: it was replaced, cut or begun anew"
-    found, told = (None if head is None else {"seq": head.seq, "hash": head.hash} for head in (last, known))
-    entry = AuditEntry(STATION, STATION, CONTINUED, "audit", reason, found, told)
+    entry = AuditEntry(STATION, STATION, CONTINUED, "audit", reason, _named(last), _named(known))
     return _append(connection, entry, last, max(head.seq for head in (last, known) if head) + _SPARE_NUMBERS)
+
+
+def note_unsigned(connection: Connection, known: Head | None) -> None:
+    """Append, at a start, a row if there are rows beyond the signed head: a killed station wrote them, or nobody knows.
+
+    Args:
+        connection: in a write transaction.
+        known: the head stored outside the database.
+    """
+    last = last_row(connection)
+    if known is not None and last is not None and last.seq > known.seq and has_row(connection, known):
+        append_audit(connection, AuditEntry(STATION, STATION, UNSIGNED, "audit", "", _named(known), _named(last)))
 
 
 def append_restored(connection: Connection, by: str, known: Head | None, new: dict[str, Any]) -> AuditRow:
@@ -125,9 +138,8 @@ def append_restored(connection: Connection, by: str, known: Head | None, new: di
     """
     last = last_row(connection)
     lost = known if known is not None and not has_row(connection, known) else None
-    here = None if last is None else {"seq": last.seq, "hash": last.hash}
-    old = None if lost is None else {"audit": lost._asdict()}
-    entry = AuditEntry(by, "command line", RESTORED, "records", "", old, {**new, "audit": here})
+    old = None if lost is None else {"audit": _named(lost)}
+    entry = AuditEntry(by, "command line", RESTORED, "records", "", old, {**new, "audit": _named(last)})
     validate_entry(entry)
     seq = None if lost is None else max(lost.seq, last.seq if last else 0) + _SPARE_NUMBERS
     return _append(connection, entry, last, seq)
@@ -182,6 +194,10 @@ def canonical(value: Any) -> str | None:
         raise BadRecordError(
             messages.AUDIT_VALUE(value=f"{value!r:.200}", words=str(error)), messages.SEE_LOG()
         ) from error
+
+
+def _named(head: Head | AuditRow | None) -> dict[str, Any] | None:
+    return None if head is None else {"seq": head.seq, "hash": head.hash}
 
 
 def _append(connection: Connection, entry: AuditEntry, last: AuditRow | None, seq: int | None) -> AuditRow:

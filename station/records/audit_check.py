@@ -1,14 +1,36 @@
 """Check of the audit trail: every row unchanged, linked to the row before, and none cut off."""
 
 import json
+import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 from sqlalchemy import Connection, select
 
-from station.records.audit import CONTINUED, GENESIS, RESTORED, AuditRow, last_row, row_of
-from station.records.audit_head import Head
+from station.records.audit import CONTINUED, GENESIS, RESTORED, UNSIGNED, AuditRow, last_row, row_of
+from station.records.audit_head import Head, read_head
+from station.records.database import reading
 from station.records.schema import audit
+from station.records.signing import PublicKeys, public_keys_of
+
+_HEAD_S, _AGAIN_S = 2.0, 0.02
+"""Longest wait for the head of a running station, and time between two readings of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """What a person who checks records knows from elsewhere."""
+
+    anchors: tuple[Head, ...] = ()
+    """Rows that the trail must have."""
+    keys: PublicKeys = ()
+    """The station's public key, and those that it had before; empty for the one in the records' folder."""
+    since: int = 0
+    """Rows before this one are not checked, as after a known and explained break."""
+
+
+NO_PROOF = Proof()
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,35 +40,64 @@ class AuditCheck:
     rows: int
     """Number of rows checked."""
     head: Head | None
-    """The last row; None for an empty trail."""
+    """The last row, with its signature if it was saved with one; None for an empty trail."""
     broken: tuple[str, ...]
     """Faults, the first broken row first; empty if the trail is complete."""
-    restored: tuple[str, ...]
-    """Rows that are missing because a person restored a backup, as the trail records; no fault by itself."""
+    notes: tuple[str, ...]
+    """What the trail records and is no fault by itself: a restored backup, rows without a signed head."""
 
 
-def check_audit(connection: Connection, saved: Head | None, anchors: Iterable[Head] = (), since: int = 0) -> AuditCheck:
+def check_trail(folder: Path, proof: Proof = NO_PROOF) -> AuditCheck:
+    """Check the trail of a records' folder, also while the station writes: its head follows a row within milliseconds.
+
+    Args:
+        proof: what the person who checks knows from elsewhere; without keys the folder's own public key is used.
+
+    Raises:
+        RecordsError: there are no records, or they cannot be read.
+        BadInputError: the folder's public key is damaged.
+    """
+    keys = proof.keys or public_keys_of(folder)
+    until_s = time.monotonic() + _HEAD_S
+    while True:
+        head = read_head(folder)
+        with reading(folder) as connection:
+            last = last_row(connection)
+            behind = keys and head is not None and last is not None and head.seq < last.seq
+            if not behind or time.monotonic() > until_s:
+                return check_audit(connection, head, proof.anchors, proof.since, keys)
+        time.sleep(_AGAIN_S)
+
+
+def check_audit(
+    connection: Connection, saved: Head | None, anchors: Iterable[Head] = (), since: int = 0, keys: PublicKeys = ()
+) -> AuditCheck:
     """Check the trail from its first row to its last.
 
     Args:
         saved: the head stored outside the database; None if it is missing.
         anchors: rows known from other sources, as a backup or a printed report.
         since: skip rows before this one, as after a known and explained break.
+        keys: of the station; the head, and each signed anchor, has to be signed by one of them. Without keys no
+            signature is checked, and rows beyond the head are no fault.
     """
     broken: list[str] = []
-    restored: list[str] = []
+    notes: list[str] = []
     number, before, hashes = 0, None, dict[int, str]()
     wanted = {anchor.seq for anchor in anchors} | ({saved.seq} if saved else set())
     for row in _rows(connection, since):
         number += 1
         if before is not None and (gap := _restored(row, before)):
-            restored.append(gap)
+            notes.append(gap)
         else:
             broken += _wrong(row, before, first_of_all=not since)
+        notes += _unsigned(row)
         if row.seq in wanted:
             hashes[row.seq] = row.hash
         before = row
     head = None if before is None else Head(before.seq, before.hash)
+    if saved is not None and head is not None and saved[:2] == head[:2]:
+        head = saved
     broken += [text for anchor in anchors if (text := _missing(anchor, hashes, "the anchor"))]
     if (
         saved is not None
@@ -56,12 +107,34 @@ def check_audit(connection: Connection, saved: Head | None, anchors: Iterable[He
         broken.append(text)
     if saved is None and last_row(connection) is not None:
         broken.append("the head kept beside the database is missing: rows may have been cut off at the end")
-    return AuditCheck(number, head, tuple(broken), tuple(restored))
+    if keys:
+        broken += _signatures(saved, anchors, keys)
+        if saved is not None and head is not None and head.seq > saved.seq:
+            broken.append(
+                f"rows {saved.seq + 1} to {head.seq}: the signed head does not name them: the station was killed "
+                "before it signed them, and its next start notes that; or somebody else wrote them"
+            )
+    return AuditCheck(number, head, tuple(broken), tuple(notes))
+
+
+def _signatures(saved: Head | None, anchors: Iterable[Head], keys: PublicKeys) -> Iterator[str]:
+    """Yield the faults of the signatures."""
+    if saved is not None and not saved.is_signed(keys):
+        yield f"row {saved.seq}: the head kept beside the database is not signed by the station's key"
+    for anchor in anchors:
+        if anchor.signature and not anchor.is_signed(keys):
+            yield f"row {anchor.seq}: the anchor is not signed by the station's key: it was changed, or is of another"
 
 
 def _rows(connection: Connection, since: int) -> Iterator[AuditRow]:
     for found in connection.execute(select(audit).where(audit.c.seq >= since).order_by(audit.c.seq)):
         yield row_of(found)
+
+
+def _unsigned(row: AuditRow) -> Iterator[str]:
+    if row.action == UNSIGNED:
+        first, last = json.loads(row.old or "{}")["seq"] + 1, json.loads(row.new or "{}")["seq"]
+        yield f"row {row.seq}: a start found rows {first} to {last} without a signed head, as a killed station leaves"
 
 
 def _restored(row: AuditRow, before: AuditRow) -> str:

@@ -4,28 +4,35 @@ import hashlib
 import os
 import shutil
 import sqlite3
+import stat
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from typing import BinaryIO
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from station.atomic_file import sync_folder
 from station.messages import records as messages
 from station.records.audit import has_row, newer_head
-from station.records.audit_head import Head, read_head
+from station.records.audit_head import Head, read_head, signed_head
+from station.records.clock import utc_ms
 from station.records.database import FILE_NAME, open_engine, plain, reading
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, DiskFullError, RecordsError
 from station.records.high_water_mark import LARGEST, HighWaterMark
 from station.records.images import FOLDER_NAME, image_path
-from station.records.retention import forget_missing, referred
-from station.records.write_requests import utc_ms
+from station.records.retention import referred
+from station.records.schema_check import check_schema
+from station.records.signing import PublicKeys, is_signed, name_of, sign
 
 MANIFEST_NAME = "backup.json"
+SIGNATURE_NAME = "backup.sig"
+"""The station's Ed25519 signature of the manifest's bytes: 64 bytes, as `openssl pkeyutl -verify -rawin` reads them."""
 MARK_NAME = "sequence"
 _PARTIAL = ".partial"
 _CHUNK_BYTES = 1 << 20
+_LONGEST_MANIFEST_BYTES, _LONGEST_SIGNATURE_BYTES = 1 << 26, 64
 
 
 class Manifest(BaseModel):
@@ -40,8 +47,10 @@ class Manifest(BaseModel):
     images: int = Field(ge=0)
     size_bytes: int = Field(ge=0)
     database_sha256: str = Field(pattern="^[0-9a-f]{64}$")
-    audit_head: str = Field(default="", pattern="^([0-9]+:[0-9a-f]{64})?$")
-    """The audit trail's last row as `ROW:HASH`, an anchor for `station audit verify`; empty if there is none."""
+    audit_head: str = Field(default="", pattern="^([0-9]+:[0-9a-f]{64}(:[0-9A-Za-z_-]{86})?)?$")
+    """The audit trail's last row, signed: an anchor for `station audit verify`; empty if there is none."""
+    missing: tuple[str, ...] = ()
+    """SHA-256 of images that the database refers to and that could not be copied; a restore records them as lost."""
     notes: tuple[str, ...] = ()
     """Images that could not be copied, or were missing before."""
 
@@ -63,8 +72,10 @@ def make_backup(folder: Path, directory: Path) -> Manifest:
         _room(folder, directory.parent)
         (partial / FOLDER_NAME).mkdir(parents=True)
         manifest = _copied(folder, partial)
-        (partial / MANIFEST_NAME).write_text(manifest.model_dump_json(indent=1), encoding="utf-8")
-        _sync(partial / MANIFEST_NAME)
+        content = manifest.model_dump_json(indent=1).encode()
+        for name, data in ((MANIFEST_NAME, content), (SIGNATURE_NAME, sign(folder, content))):
+            (partial / name).write_bytes(data)
+            _sync(partial / name)
         sync_folder(partial)
         partial.rename(directory)
         sync_folder(directory.parent)
@@ -77,17 +88,21 @@ def make_backup(folder: Path, directory: Path) -> Manifest:
     return manifest
 
 
-def read_manifest(directory: Path) -> Manifest:
-    """Read a backup's manifest.
+def read_manifest(directory: Path, keys: PublicKeys | None) -> Manifest:
+    """Read a backup's manifest, and check that a station signed it.
 
     Args:
         directory: as `make_backup` made it.
+        keys: of which one has to have signed it; None for a backup that is used without a signature.
 
     Raises:
-        RecordsError: it is no backup, or an incomplete one.
+        RecordsError: it is no backup, an incomplete one, or not signed by one of the keys.
     """
     try:
-        return Manifest.model_validate_json((directory / MANIFEST_NAME).read_bytes())
+        content = _read(directory / MANIFEST_NAME, _LONGEST_MANIFEST_BYTES)
+        if keys is not None:
+            _check_signature(directory, content, keys)
+        return Manifest.model_validate_json(content)
     except FileNotFoundError:
         raise RecordsError(
             messages.NO_BACKUP(path=str(directory), file=MANIFEST_NAME), messages.NAME_BACKUP()
@@ -101,8 +116,43 @@ def read_manifest(directory: Path) -> Manifest:
         raise map_error(error, str(directory)) from error
 
 
-def copy_image(source: Path, target: Path, sha256: str) -> int:
+def _check_signature(directory: Path, content: bytes, keys: PublicKeys) -> None:
+    try:
+        signature = _read(directory / SIGNATURE_NAME, _LONGEST_SIGNATURE_BYTES)
+    except FileNotFoundError:
+        raise DamagedError(messages.BACKUP_UNSIGNED(path=str(directory)), messages.TRUST_BACKUP()) from None
+    if not is_signed(keys, signature, content):
+        raise DamagedError(
+            messages.BACKUP_OTHER_KEY(path=str(directory), keys=", ".join(map(name_of, keys)) or "-"),
+            messages.TRUST_BACKUP(),
+        )
+
+
+def open_regular(path: Path, most_bytes: int) -> BinaryIO:
+    """Open a file of a backup that may be anything, as a device that never ends.
+
+    Raises:
+        FileNotFoundError: it is missing.
+        DamagedError: it is no regular file, or larger.
+    """
+    file = os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb")
+    found = os.fstat(file.fileno())
+    if not stat.S_ISREG(found.st_mode) or found.st_size > most_bytes:
+        file.close()
+        raise DamagedError(messages.NO_SUCH_FILE(path=str(path), most=most_bytes), messages.TAKE_ANOTHER())
+    return file
+
+
+def _read(path: Path, most_bytes: int) -> bytes:
+    with open_regular(path, most_bytes) as file:
+        return file.read(most_bytes)
+
+
+def copy_image(source: Path, target: Path, sha256: str, size_bytes: int) -> int:
     """Copy an image, durably, if its content matches its name.
+
+    Args:
+        size_bytes: as recorded; no more is read.
 
     Returns:
         Its size in bytes.
@@ -111,7 +161,7 @@ def copy_image(source: Path, target: Path, sha256: str) -> int:
         FileNotFoundError: it is missing.
         DamagedError: its content does not match.
     """
-    content = source.read_bytes()
+    content = _read(source, size_bytes)
     if hashlib.sha256(content).hexdigest() != sha256:
         raise DamagedError(messages.OTHER_CONTENT(path=str(source)), messages.PUT_BACK_BACKUP())
     target.parent.mkdir(exist_ok=True)
@@ -146,28 +196,29 @@ def _copied(folder: Path, partial: Path) -> Manifest:
     with reading(folder) as live, closing(sqlite3.connect(path)) as target:
         plain(live).backup(target)  # in one step: a reader of the write-ahead log delays no other
         target.execute("PRAGMA journal_mode = DELETE")
-        faults = list(integrity(target))
+        faults = [*check_schema(target), *integrity(target)]
     if faults:
         raise DamagedError(messages.BAD_FILE(path=str(folder / FILE_NAME), words=faults[0]), messages.RUN_CHECK_KEEP())
-    size_bytes, notes = _copy_images(folder, partial)
-    head, cut = _audit_head(path, known)
+    size_bytes, missing, notes = _copy_images(folder, partial)
+    head, cut = _audit_head(folder, path, known)
     with closing(sqlite3.connect(path)) as target:
         inspections, last = target.execute("SELECT count(*), max(sequence) FROM inspections").fetchone()
-        images = target.execute("SELECT count(DISTINCT sha256) FROM images").fetchone()[0]
+        (referred_to,) = target.execute("SELECT count(DISTINCT sha256) FROM images").fetchone()
     _sync(path)
     return Manifest(
         made_utc_ms=utc_ms(),
         sequence=max(HighWaterMark(folder / MARK_NAME).value, last or 0),
         inspections=inspections,
-        images=images,
+        images=referred_to - len(missing),
         size_bytes=size_bytes + path.stat().st_size,
         database_sha256=hash_of(path),
         audit_head=head,
+        missing=missing,
         notes=(*notes, *cut),
     )
 
 
-def _audit_head(path: Path, known: Head | None) -> tuple[str, tuple[str, ...]]:
+def _audit_head(folder: Path, path: Path, known: Head | None) -> tuple[str, tuple[str, ...]]:
     """Return the copied trail's last row, and whether it lacks rows that existed before the copy."""
     engine = open_engine(path, "ro")
     try:
@@ -177,33 +228,31 @@ def _audit_head(path: Path, known: Head | None) -> tuple[str, tuple[str, ...]]:
     finally:
         engine.dispose()
     note = "the audit trail lacks rows that it had: see `station audit verify`"
-    return f"{head.seq}:{head.hash}" if head else "", (note,) if cut else ()
+    return str(signed_head(folder, head)) if head else "", (note,) if cut else ()
 
 
-def _copy_images(folder: Path, partial: Path) -> tuple[int, list[str]]:
-    """Copy the images that the copied database refers to, without those that the quota has removed since."""
-    engine = open_engine(partial / FILE_NAME, "rw")
-    size_bytes, missing, damaged = 0, set[str](), list[str]()
+def _copy_images(folder: Path, partial: Path) -> tuple[int, tuple[str, ...], list[str]]:
+    """Copy the images that the copied database refers to; the quota may have removed some since."""
+    engine = open_engine(partial / FILE_NAME, "ro")
     try:
-        with engine.begin() as connection:
-            for sha256 in referred(connection):
-                try:
-                    size_bytes += copy_image(image_path(folder, sha256), image_path(partial, sha256), sha256)
-                except FileNotFoundError:
-                    missing.add(sha256)
-                except DamagedError as error:
-                    missing.add(sha256)
-                    damaged.append(str(error.cause))
-            if missing:
-                forget_missing(connection, frozenset(missing))
-        with closing(sqlite3.connect(partial / FILE_NAME)) as plain:
-            plain.execute("PRAGMA journal_mode = DELETE")
+        with engine.connect() as connection:
+            wanted = referred(connection)
     finally:
         engine.dispose()
+    size_bytes, missing, damaged = 0, list[str](), list[str]()
+    for sha256, size in wanted.items():
+        try:
+            size_bytes += copy_image(image_path(folder, sha256), image_path(partial, sha256), sha256, size)
+        except FileNotFoundError:
+            missing.append(sha256)
+        except DamagedError as error:
+            missing.append(sha256)
+            damaged.append(str(error.cause))
     for subfolder in (partial / FOLDER_NAME, *(partial / FOLDER_NAME).iterdir()):
         sync_folder(subfolder)
     gone = len(missing) - len(damaged)
-    return size_bytes, [*damaged, *([f"{gone} images were removed or missing meanwhile"] if gone else [])]
+    notes = [*damaged, *([f"{gone} images were removed or missing meanwhile"] if gone else [])]
+    return size_bytes, tuple(missing), notes
 
 
 def _room(folder: Path, place: Path) -> None:

@@ -167,6 +167,27 @@ def migrate(engine: Engine, folder: Path) -> None:
         ) from error
 
 
+def make_schema(connection: Connection, revision: str) -> None:
+    """Make the tables, indexes and triggers of a version in an empty database.
+
+    Raises:
+        SchemaError: this program does not know the version.
+    """
+    from alembic import command  # noqa: PLC0415 (see `migrate`)
+    from alembic.config import Config  # noqa: PLC0415
+    from alembic.util import CommandError  # noqa: PLC0415
+
+    config = Config()
+    config.set_main_option("script_location", str(MIGRATIONS).replace("%", "%%"))
+    config.attributes["connection"] = connection
+    try:
+        command.upgrade(config, revision)
+    except CommandError as error:
+        raise SchemaError(
+            messages.NEWER_SCHEMA(path=str(connection.engine.url.database), schema=revision), messages.USE_NEWER()
+        ) from error
+
+
 def _backed_up(folder: Path, revision: str) -> Path:
     """Copy the whole database, durably before the copy gets its name."""
     backup = folder / "backups" / f"{stamp()}-form-{revision}.sqlite3"

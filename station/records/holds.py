@@ -6,9 +6,9 @@ from sqlalchemy import ColumnElement, Connection, exists, insert, or_, select, u
 
 from station.messages import records as messages
 from station.messages.message import Message
+from station.records.clock import utc_ms
 from station.records.errors import RecordsError
 from station.records.schema import holds, inspections
-from station.records.write_requests import utc_ms
 
 
 class Hold(NamedTuple):

@@ -11,8 +11,8 @@ import jinja2
 from station.charts.area_chart import report_style
 from station.charts.area_histogram import area_histogram
 from station.charts.spark import spark
+from station.records.clock import utc_ms
 from station.records.lot_summary import Example, LotSummary
-from station.records.write_requests import utc_ms
 
 SUFFIX = ".html"
 _PICTURE_PX = 320

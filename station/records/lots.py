@@ -5,9 +5,10 @@ from typing import NamedTuple
 from sqlalchemy import Connection, insert, select, update
 
 from station.messages import records as messages
+from station.records.clock import utc_ms
 from station.records.errors import RecordsError
 from station.records.schema import lots
-from station.records.write_requests import queue_event, utc_ms
+from station.records.write_requests import queue_event
 
 LONGEST_NAME = 32
 """As the PLC gives it: `station.channel.line.Begin.lot`."""

@@ -6,9 +6,9 @@ from sqlalchemy import Connection, delete, select
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from station.messages import records as messages
+from station.records.clock import utc_ms
 from station.records.errors import UnknownInspectionError
 from station.records.schema import inspections, marks
-from station.records.write_requests import utc_ms
 
 Mark = Literal["good", "bad"]
 

@@ -12,7 +12,7 @@ from sqlalchemy import Connection, func, select
 from station.atomic_file import sync_folder
 from station.messages import records as messages
 from station.messages.message import Message
-from station.records.audit import continue_audit, newer_head
+from station.records.audit import continue_audit, newer_head, note_unsigned
 from station.records.audit_head import Head, read_head, try_save_head
 from station.records.database import FILE_NAME, check, migrate, move_aside, open_engine
 from station.records.error_mapping import map_error
@@ -20,6 +20,8 @@ from station.records.errors import DamagedError, LockedError, RecordsError, Sequ
 from station.records.high_water_mark import HighWaterMark
 from station.records.images import FOLDER_NAME, ImageStore
 from station.records.schema import inspections
+from station.records.seals import begin_seals
+from station.records.signing import name_of, own_public_key
 from station.records.write_requests import add_event, end_open_inspections
 from station.records.writer import Writer
 from station.settings.records import RecordsSettings
@@ -105,8 +107,10 @@ def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
         sync_folder(folder)
         writer = Writer(*_connector(path, mark), str(path))
         try:
-            head = read_head(folder)
-            lost = writer.submit(lambda connection: _first_transaction(connection, mark, head, boot, notices)).result()
+            head, public_key = read_head(folder), name_of(own_public_key(folder))
+            lost = writer.submit(
+                lambda connection: _first_transaction(connection, mark, head, public_key, boot, notices)
+            ).result()
             images = ImageStore(folder, settings, writer.submit)
         except BaseException:
             writer.close()
@@ -194,13 +198,20 @@ def _connector(
 
 
 def _first_transaction(
-    connection: Connection, mark: HighWaterMark, head: Head | None, boot: str, notices: tuple[Notice, ...]
+    connection: Connection,
+    mark: HighWaterMark,
+    head: Head | None,
+    public_key: str,
+    boot: str,
+    notices: tuple[Notice, ...],
 ) -> tuple[int, ...]:
     """Run the first transaction of a start."""
     mark.value = max(mark.value, connection.scalar(select(func.max(inspections.c.sequence))) or 0)
+    if continue_audit(connection, head) is None:
+        note_unsigned(connection, head)
+    begin_seals(connection, mark.value, public_key)
     lost = end_open_inspections(connection)
     add_event(connection, "opened", None, {"boot": boot, "station_lost": lost})
-    continue_audit(connection, head)
     for notice in notices:
         details = {"cause": str(notice.cause), "remedy": str(notice.remedy)}
         add_event(connection, f"notice_{notice.code}", None, details)

@@ -12,17 +12,19 @@ from sqlalchemy import func, insert, select
 
 from station.atomic_file import sync_folder
 from station.messages import records as messages
-from station.records.audit import append_restored
-from station.records.audit_head import Head, read_head, try_save_head
-from station.records.backup import MARK_NAME, Manifest, copy_image, hash_of, integrity, read_manifest
+from station.records.audit import append_restored, newer_head
+from station.records.audit_head import read_head, try_save_head
+from station.records.backup import MARK_NAME, Manifest, copy_image, hash_of, integrity, open_regular, read_manifest
 from station.records.database import FILE_NAME, migrate, move_aside, open_engine
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, RecordsError
 from station.records.high_water_mark import HighWaterMark
 from station.records.images import FOLDER_NAME, image_path
 from station.records.open import BELONGING, lock_folder
-from station.records.retention import referred
+from station.records.retention import forget_missing, referred
 from station.records.schema import origins, outbox
+from station.records.schema_check import check_schema
+from station.records.signing import PublicKeys
 
 _NEW = "restoring"
 
@@ -36,7 +38,7 @@ class RestoreResult(NamedTuple):
     """Folder of the previous records."""
 
 
-def restore_backup(folder: Path, directory: Path, by: str) -> RestoreResult:
+def restore_backup(folder: Path, directory: Path, by: str, keys: PublicKeys | None) -> RestoreResult:
     """Restore a backup, all of it or nothing. Numbers given since it was made are not given again.
 
     All is copied and verified first, beside the records; then the present records are moved aside and the copy replaces
@@ -46,11 +48,13 @@ def restore_backup(folder: Path, directory: Path, by: str) -> RestoreResult:
         folder: the records' folder; no station has it open.
         directory: as `make_backup` made it.
         by: name of the person, for the audit trail.
+        keys: of stations, of which one has to have signed the backup; None for a backup without a known signature.
 
     Raises:
-        RecordsError: a station runs, the backup is not complete, or the disk failed; the records are unchanged.
+        RecordsError: a station runs, the backup is not complete or not signed, or the disk failed; the records are
+            unchanged.
     """
-    manifest = read_manifest(directory)
+    manifest = read_manifest(directory, keys)
     lock = lock_folder(folder)
     new = folder / _NEW
     try:
@@ -77,11 +81,15 @@ def restore_backup(folder: Path, directory: Path, by: str) -> RestoreResult:
 def _copied(directory: Path, new: Path, manifest: Manifest) -> None:
     """Copy database and images, each verified against the manifest."""
     source, path = directory / FILE_NAME, new / FILE_NAME
-    if not source.exists() or hash_of(source) != manifest.database_sha256:
+    try:
+        with open_regular(source, manifest.size_bytes) as file, path.open("wb") as copy:
+            shutil.copyfileobj(file, copy)
+    except FileNotFoundError:
+        path.unlink(missing_ok=True)
+    if not path.exists() or hash_of(path) != manifest.database_sha256:
         raise DamagedError(messages.NOT_THE_VERIFIED(path=str(source)), messages.TAKE_ANOTHER())
-    shutil.copyfile(source, path)
     with closing(sqlite3.connect(path)) as connection:
-        faults = list(integrity(connection))
+        faults = check_schema(connection) or list(integrity(connection))
     if faults:
         raise DamagedError(messages.BAD_FILE(path=str(source), words=faults[0]), messages.TAKE_ANOTHER())
     engine = open_engine(path, "rw")
@@ -90,9 +98,9 @@ def _copied(directory: Path, new: Path, manifest: Manifest) -> None:
             wanted = referred(connection)
     finally:
         engine.dispose()
-    for sha256 in wanted:
+    for sha256 in wanted.keys() - set(manifest.missing):
         try:
-            copy_image(image_path(directory, sha256), image_path(new, sha256), sha256)
+            copy_image(image_path(directory, sha256), image_path(new, sha256), sha256, wanted[sha256])
         except FileNotFoundError:
             raise DamagedError(
                 messages.IMAGE_MISSING(path=str(directory), image=sha256), messages.TAKE_ANOTHER()
@@ -110,8 +118,12 @@ def _continue(folder: Path, new: Path, manifest: Manifest, by: str) -> None:
             after = (connection.scalar(select(func.max(outbox.c.entry))) or 0) + 1
             connection.execute(insert(origins).values(first_entry=after, id=uuid.uuid4().hex).prefix_with("OR REPLACE"))
             told = {"made_utc_ms": manifest.made_utc_ms, "inspections": manifest.inspections}
-            row = append_restored(connection, by, read_head(folder), told)
-        try_save_head(folder, Head(row.seq, row.hash))
+            append_restored(connection, by, read_head(folder), told)
+            if manifest.missing:
+                forget_missing(connection, frozenset(manifest.missing))
+            head = newer_head(connection, None)
+        if head is not None:
+            try_save_head(folder, head)
     except RecordsError:
         raise
     except Exception as error:

@@ -15,6 +15,7 @@ from sqlalchemy import (
     MetaData,
     Table,
     Text,
+    text,
 )
 
 metadata = MetaData(
@@ -263,6 +264,7 @@ audit = Table(
     Column("previous_hash", Text, nullable=False),
     Column("hash", Text, nullable=False),
     Index("ix_audit_action", "action", "seq"),
+    Index("ix_audit_without_seals", "seq", sqlite_where=text("action <> 'inspection.sealed'")),
 )
 """Triggers refuse every change but an insert behind the last row. `old` and `new` are canonical JSON, as hashed."""
 

@@ -1,6 +1,5 @@
 """Write requests of the records, each a function of the writer's connection."""
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, Literal
@@ -12,6 +11,7 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 from station.channel.line import Outcome, Reason
 from station.messages import records as messages
 from station.messages.message import Message, text_of
+from station.records.clock import utc_ms
 from station.records.errors import BadRecordError, UnknownInspectionError
 from station.records.model import AlarmEntry, AlarmRow, InspectionRecord, Trigger
 from station.records.schema import (
@@ -25,16 +25,12 @@ from station.records.schema import (
     outbox,
     recipe_snapshots,
 )
+from station.records.seals import append_skipped, note_skipped, seal
 from station.records.search_index import index_hour, index_reasons
 from station.records.stored_message import FIRST_PRESS, JUDGEMENT, to_stored
 
 OutboxKind = Literal["inspection", "lot", "audit"]
 _PENDING = (text_of(messages.IMAGES_PENDING()), "pending")  # the second: of versions before messages
-
-
-def utc_ms() -> int:
-    """Return the machine's clock, ms since 1970."""
-    return time.time_ns() // 1_000_000
 
 
 def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot: str) -> None:
@@ -67,6 +63,7 @@ def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot
         "size_class": trigger.size_class,
     }
     _lost(begun)
+    note_skipped(connection, sequence)
     sha256 = recipe.sha256 if recipe else None
     connection.execute(insert(inspections).values(**begun, boot=boot, recipe_sha256=sha256, images_state=""))
     index_hour(connection, sequence, trigger.began_utc_ms)
@@ -75,6 +72,7 @@ def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot
 def withdraw(connection: Connection, sequence: int) -> None:
     """Withdraw an inspection whose caller was gone when it was durable; its number is not given again."""
     connection.execute(delete(inspections).where(inspections.c.sequence == sequence, inspections.c.outcome.is_(None)))
+    append_skipped(connection, sequence, sequence)
     add_event(connection, "begin_withdrawn", sequence, {})
 
 
@@ -127,6 +125,7 @@ def conclude(
     if record.curve:
         points = [{**asdict(point), "flags": list(point.flags), "sequence": sequence} for point in record.curve]
         connection.execute(insert(curve_points), points)
+    seal(connection, sequence, "record", "outcome")
     if row.published_utc_ms is not None:
         queue_event(connection, "inspection", sequence)
     return standing, images_state
@@ -157,6 +156,8 @@ def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: st
     )
     stood = None if found is None or found.standing is None else Outcome.model_validate_json(found.standing)
     index_reasons(connection, stood, outcome)
+    if stood != outcome:
+        seal(connection, outcome.sequence, "outcome")
     queue_event(connection, "inspection", outcome.sequence)
     return True
 
@@ -200,10 +201,12 @@ def end_open_inspections(connection: Connection) -> list[int]:
             .values(outcome=lost.outcome, standing=lost.model_dump_json(), ended_utc_ms=lost.ended_utc_ms)
         )
         index_reasons(connection, None if row.standing is None else Outcome.model_validate_json(row.standing), lost)
+        seal(connection, row.sequence, "outcome")
     lost_images = (
         update(inspections).where(table.images_state.in_(_PENDING)).values(images_state=text_of(messages.IMAGES_LOST()))
     )
     for row in connection.execute(lost_images.returning(table.sequence, table.published_utc_ms)).all():
+        seal(connection, row.sequence, "images")
         if row.published_utc_ms is not None:
             queue_event(connection, "inspection", row.sequence)
     return [row.sequence for row in rows]
@@ -238,7 +241,9 @@ def add_images(connection: Connection, sequence: int, rows: Sequence[Mapping[str
         connection.execute(insert(images), [{"sequence": sequence, **row} for row in rows])
     table = inspections.c
     changed = update(inspections).where(table.sequence == sequence).values(images_state=text_of(state))
-    if connection.scalar(changed.returning(table.published_utc_ms)) is not None:
+    published_utc_ms = connection.scalar(changed.returning(table.published_utc_ms))
+    seal(connection, sequence, "images")
+    if published_utc_ms is not None:
         queue_event(connection, "inspection", sequence)
 
 

@@ -48,7 +48,7 @@ class Writer:
         Args:
             connect: called in the thread, again after each failure.
             before_commit: called in each transaction after its requests; if it raises, all of them fail.
-            after_commit: called after each commit, before the answers; never raises.
+            after_commit: called after each commit's answers; never raises.
             place: the database's path, for messages.
 
         Raises:
@@ -123,6 +123,7 @@ class Writer:
     def _carry_out(self, batch: list[tuple[Work[Any], Future[Any]]]) -> None:
         """Run one transaction, and then answer its requests."""
         answers: list[Any] = []
+        committed = False
         try:
             if self._connection is None:
                 self._connection = self._connect()
@@ -135,16 +136,18 @@ class Writer:
             self.error = told.message
             self._disconnect()  # the next batch begins with a sound connection, if there can be one
         else:
-            self._after_commit()
             self.writes += 1
             self.last_write_s = time.monotonic()
             self.error = None
+            committed = True
         for (_, future), answer in zip(batch, answers, strict=True):
             if isinstance(answer, RecordsError):
                 self.failures[answer.code] += 1
                 future.set_exception(answer)
             else:
                 future.set_result(answer)
+        if committed:
+            self._after_commit()
 
     def _attempt(self, connection: Connection, work: Work[Any]) -> Any:
         """Return the request's result, or the error for which it alone was rolled back; raise errors of the whole."""

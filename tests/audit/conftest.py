@@ -50,13 +50,17 @@ def station(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tu
 
 @pytest.fixture
 def meddle(folder: Path) -> Callable[[str], None]:
-    """Change the database behind the trail's back, its triggers taken away, as one with the file in hand can."""
+    """Change the database behind the trail's back, its triggers away meanwhile, as one with the file in hand can."""
 
     def change(statement: str) -> None:
         connection = sqlite3.connect(folder / "records.sqlite3")
-        for name in ("audit_no_update", "audit_no_delete", "audit_only_after"):
-            connection.execute(f"DROP TRIGGER IF EXISTS {name}")
+        query = "SELECT name, sql FROM sqlite_master WHERE type = 'trigger' AND name <> 'audit_told'"
+        found = connection.execute(query).fetchall()
+        for name, _ in found:
+            connection.execute(f"DROP TRIGGER {name}")
         connection.execute(statement)
+        for _, text in found:
+            connection.execute(text)
         connection.commit()
         connection.close()
 

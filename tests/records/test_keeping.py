@@ -15,6 +15,7 @@ from station.records.errors import DamagedError, DiskFullError, LockedError, Rec
 from station.records.holds import hold, release
 from station.records.integrity_check import check_records
 from station.records.restore import restore_backup
+from station.records.signing import public_keys_of
 from tests.records.causes import because
 
 
@@ -80,7 +81,7 @@ def test_a_backup_while_the_station_writes_is_whole_and_can_be_put_back(
             assert 3 <= made.inspections <= 13
             assert made.notes == ()
             with pytest.raises(LockedError, check=because(messages.ANOTHER_STATION)):
-                await asyncio.to_thread(restore_backup, folder, copy, "ada")
+                await asyncio.to_thread(restore_backup, folder, copy, "ada", public_keys_of(folder))
         return made
 
     made = scenario(steps)
@@ -121,12 +122,64 @@ def test_a_backup_that_is_not_whole_is_not_put_back(opened, scenario, inspected,
     before = (folder / FILE_NAME).read_bytes()
     with pytest.raises(
         DamagedError,
-        check=because(messages.OTHER_CONTENT, messages.BAD_FILE, messages.NOT_THE_VERIFIED, messages.IMAGE_MISSING),
+        check=because(messages.OTHER_CONTENT, messages.BACKUP_OTHER_KEY, messages.NOT_THE_VERIFIED),
     ):
-        restore_backup(folder, tmp_path / "copy", "ada")
+        restore_backup(folder, tmp_path / "copy", "ada", public_keys_of(folder))
     assert (folder / FILE_NAME).read_bytes() == before
     assert names(folder)
     assert not (folder / "aside").exists()
+
+
+def test_a_backup_without_a_signature_needs_to_be_trusted(opened, scenario, inspected, noise, folder, tmp_path, ask):
+    async def steps():
+        async with opened() as records:
+            await inspected(records, 1, noise())
+
+    scenario(steps)
+    make_backup(folder, tmp_path / "copy")
+    (tmp_path / "copy" / "backup.sig").unlink()
+    said = ask("restore", tmp_path / "copy")
+    assert said.exit_code == 1
+    assert said.exception.cause == messages.BACKUP_UNSIGNED(path=str(tmp_path / "copy"))
+    assert "results that were changed in it are then not found" in str(said.exception)
+    assert "restored 1 inspections and 1 images" in ask("restore", tmp_path / "copy", "--unverified").output
+    assert ask("check").exit_code == 0
+
+
+@pytest.mark.parametrize("name", [FILE_NAME, MANIFEST_NAME, "backup.sig", "image"])
+def test_a_backup_whose_file_is_a_device_is_refused_at_once(
+    opened, scenario, inspected, noise, folder, tmp_path, ask, name
+):
+    async def steps():
+        async with opened() as records:
+            await inspected(records, 1, noise())
+
+    scenario(steps)
+    make_backup(folder, tmp_path / "copy")
+    path = tmp_path / "copy" / name
+    if name == "image":
+        (path,) = (tmp_path / "copy" / "images").glob("*/*.png")
+    path.unlink()
+    path.symlink_to("/dev/zero")
+    said = ask("restore", tmp_path / "copy")
+    assert said.exit_code == 1
+    assert "this is no file, or larger than" in str(said.exception)
+
+
+def test_images_that_a_backup_could_not_copy_are_lost_after_its_restore(
+    opened, scenario, inspected, noise, folder, tmp_path, ask
+):
+    async def steps():
+        async with opened() as records:
+            await inspected(records, 1, noise())
+            await inspected(records, 1, noise())
+
+    scenario(steps)
+    (next((folder / "images").glob("*/*.png"))).unlink()
+    assert "note: 1 images were removed or missing" in ask("backup", tmp_path / "copy").output
+    assert "restored 2 inspections and 1 images" in ask("restore", tmp_path / "copy").output
+    assert ask("check").exit_code == 0
+    assert "lost: 1 of its files were found missing" in ask("show", 1).output + ask("show", 2).output
 
 
 def test_a_backup_needs_its_space_and_leaves_nothing_half_made(opened, scenario, inspected, noise, folder, small_disk):
@@ -140,7 +193,7 @@ def test_a_backup_needs_its_space_and_leaves_nothing_half_made(opened, scenario,
         make_backup(folder, small_disk / "copy")
     assert list(small_disk.iterdir()) == []
     with pytest.raises(RecordsError, check=because(messages.NO_BACKUP)):
-        restore_backup(folder, small_disk, "ada")
+        restore_backup(folder, small_disk, "ada", None)
 
 
 def test_a_check_finds_what_is_wrong_and_the_next_start_reconciles(
