@@ -78,6 +78,9 @@ SUFFIXES = (".csv", ".parquet")
 
 Rows = Sequence[Sequence[Any]]
 
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""A spreadsheet takes a text that begins so for a formula; lots' and growers' names come from outside."""
+
 
 def export(folder: Path, query: Query, target: Path) -> int:
     """Write the inspections that match a query, in order of number; the file appears when it is complete.
@@ -186,4 +189,6 @@ def _text(kind: pa.DataType, value: Any) -> Any:
         return ""
     if pa.types.is_timestamp(kind):
         return datetime.fromtimestamp(value / 1000, UTC).isoformat(timespec="milliseconds")
-    return ("true" if value else "false") if pa.types.is_boolean(kind) else value
+    if pa.types.is_boolean(kind):
+        return "true" if value else "false"
+    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value

@@ -51,6 +51,22 @@ def test_csv_and_parquet_hold_the_same(history, ask, tmp_path, monkeypatch):
         assert told["simulated"] == "true"
 
 
+@pytest.mark.parametrize("name", ["=1+1", "+1", "-1+2", "@SUM(A1)", "\t=1", "\r=1"])
+def test_no_cell_of_a_csv_is_a_formula(opened, scenario, trigger, passed, ask, tmp_path, name):
+    async def steps():
+        async with opened() as records:
+            begun = replace(trigger, lot=name)
+            await records.published(
+                await records.conclude(await records.begin(begun), replace(passed, closing_mm=-1.0))
+            )
+
+    scenario(steps)
+    ask("export", tmp_path / "all.csv")
+    with (tmp_path / "all.csv").open(newline="", encoding="utf-8") as file:
+        (row,) = csv.DictReader(file)
+    assert (row["lot"], row["closing_mm"]) == (f"'{name}", "-1.0")
+
+
 def test_an_export_holds_what_was_asked_for(history, ask, tmp_path):
     for conditions, number in ((("--lot", "other"), 3), (("--outcome", "FAIL"), 3), (("--reason", "early_stop"), 3)):
         said = ask("export", tmp_path / "some.csv", *conditions)
