@@ -18,6 +18,7 @@ SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp",
 LARGEST_FILE_BYTES = 200_000_000
 LARGEST_IMAGE_PX = 50_000_000
 SMALLEST_SIDE_PX = 32
+_PNG = b"\x89PNG\r\n\x1a\n"
 _MODES = {"P": "palette", "PA": "palette", "CMYK": "CMYK", "LAB": "CIELAB"}
 
 
@@ -55,7 +56,10 @@ def decode_file(path: Path) -> Decoded:
     except OSError as error:
         raise BadInputError(f"{printable_name(path)}: cannot be read: {error.strerror}") from error
     conversions = _checked(path, data)
-    raw = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    try:
+        raw = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        raw = None
     if raw is None:
         raise BadInputError(f"{printable_name(path)}: cannot be decoded; export it again as PNG or JPEG")
     decoded = to_colour(path, np.asarray(raw))
@@ -71,13 +75,7 @@ def _checked(path: Path, data: bytes) -> list[str]:
         raise BadInputError(f"{printable_name(path)}: the file is empty; copy it again")
     try:
         with warnings.catch_warnings(action="ignore"), PIL.Image.open(BytesIO(data), formats=FORMATS) as picture:
-            width, height = picture.size
-            if width * height > LARGEST_IMAGE_PX:
-                raise BadInputError(f"{printable_name(path)}: {width}x{height} is more than {LARGEST_IMAGE_PX} pixels")
-            if min(width, height) < SMALLEST_SIDE_PX:
-                raise BadInputError(
-                    f"{printable_name(path)}: {width}x{height} is smaller than {SMALLEST_SIDE_PX} pixels a side"
-                )
+            _check_size(path, *picture.size)
             picture.load()
             conversions = [f"{_MODES[picture.mode]} turned into colour"] if picture.mode in _MODES else []
             if getattr(picture, "n_frames", 1) > 1:
@@ -86,11 +84,34 @@ def _checked(path: Path, data: bytes) -> list[str]:
         raise BadInputError(f"{printable_name(path)}: not an image; expected one of {', '.join(FORMATS)}") from error
     except PIL.Image.DecompressionBombError as error:
         raise BadInputError(f"{printable_name(path)}: more than {LARGEST_IMAGE_PX} pixels") from error
-    except (OSError, SyntaxError, ValueError) as error:
+    except BadInputError:
+        raise
+    except Exception as error:  # Pillow raises any kind of error for a damaged file
         raise BadInputError(
             f"{printable_name(path)}: damaged or cut short ({error}); copy it again from the source"
         ) from error
+    if data.startswith(_PNG):
+        _check_chunks(path, data)
     return conversions
+
+
+def _check_size(path: Path, width_px: int, height_px: int) -> None:
+    if width_px * height_px > LARGEST_IMAGE_PX:
+        raise BadInputError(f"{printable_name(path)}: {width_px}x{height_px} is more than {LARGEST_IMAGE_PX} pixels")
+    if min(width_px, height_px) < SMALLEST_SIDE_PX:
+        raise BadInputError(
+            f"{printable_name(path)}: {width_px}x{height_px} is smaller than {SMALLEST_SIDE_PX} pixels a side"
+        )
+
+
+def _check_chunks(path: Path, data: bytes) -> None:
+    """Refuse a PNG with a chunk longer than the file: OpenCV allocates up to 4 GB for it before it reads."""
+    start, kind = len(_PNG), b""
+    while kind != b"IEND":
+        length, kind = int.from_bytes(data[start : start + 4]), data[start + 4 : start + 8]
+        start += 12 + length
+        if start > len(data):
+            raise BadInputError(f"{printable_name(path)}: damaged or cut short; copy it again from the source")
 
 
 def to_colour(path: Path, raw: np.ndarray) -> Decoded:

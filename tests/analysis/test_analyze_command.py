@@ -6,6 +6,7 @@ import os
 import pty
 import resource
 import shutil
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -145,6 +146,27 @@ def spoil_missing(folder: Path) -> Path:
     return folder / "bad.png"
 
 
+def spoil_second_page(folder: Path) -> Path:
+    """A TIFF whose second page has no dimensions."""
+    path = folder / "bad.tif"
+    cv2.imwrite(str(path), np.zeros((320, 240, 3), np.uint8))
+    content = path.read_bytes()
+    (first,) = struct.unpack("<I", content[4:8])
+    after = first + 2 + 12 * struct.unpack("<H", content[first : first + 2])[0]
+    page = struct.pack("<HHHIII", 1, 269, 2, 1, 0, 0)
+    path.write_bytes(content[:after] + struct.pack("<I", len(content)) + content[after + 4 :] + page)
+    return path
+
+
+def spoil_chunk(folder: Path) -> Path:
+    """A PNG with a chunk of 4 GB by its length, behind the pixels."""
+    path = folder / "bad.png"
+    cv2.imwrite(str(path), np.zeros((320, 240, 3), np.uint8))
+    content = path.read_bytes()
+    path.write_bytes(content[:-12] + struct.pack(">I4s", 0xFF00304B, b"juNk") + content[-12:])
+    return path
+
+
 def spoil_video(folder: Path) -> Path:
     path = folder / "bad.mp4"
     path.write_bytes(b"\x00\x00\x00\x18ftypmp42" + bytes(500))
@@ -165,6 +187,8 @@ def spoil_folder(folder: Path) -> Path:
         (spoil_empty, "the file is empty"),
         (spoil_size, "the reference has 240x320"),
         (spoil_missing, "there is no such file"),
+        (spoil_second_page, "damaged or cut short"),
+        (spoil_chunk, "damaged or cut short"),
         (spoil_video, "no frame of this video can be decoded"),
         (spoil_folder, "the folder has no images"),
     ],
