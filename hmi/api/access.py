@@ -1,5 +1,7 @@
 """Authentication of the HTTP API: a system by its token, or a person who is logged in at the pages."""
 
+import math
+import time
 from collections.abc import Awaitable, Callable
 from typing import Annotated
 
@@ -10,6 +12,7 @@ from hmi.api.tokens import ApiTokens
 from hmi.web.access import caller_of, genuine, hmi_of
 from hmi.web.roles import RIGHTS, Right, Role
 from station.channel.panel import Actor
+from station.channel.panel_live import PersonNoted
 
 LONGEST_TOKEN = 200
 _bearer = HTTPBearer(
@@ -18,6 +21,8 @@ _bearer = HTTPBearer(
     description="Made by `station api-token add NAME`; or the cookie of a person who is logged in at the pages.",
 )
 Bearer = Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)]
+_COUNTED_S = 3600.0
+_API = Actor(who="api", role="viewer")
 _CHALLENGE = {"www-authenticate": "Bearer"}
 
 
@@ -29,13 +34,33 @@ def tokens_of(request: Request) -> ApiTokens:
     return state.api_tokens
 
 
+class RefusedTokens:
+    """Count of refused tokens: the audit trail gets the first, tenth, hundredth … of an hour, so that nobody fills it.
+
+    Args:
+        clock: monotonic.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._began_s = -math.inf
+        self._number = 0
+
+    def count(self) -> int | None:
+        """Count one, and return the number of the hour if a row is due."""
+        if self._clock() - self._began_s > _COUNTED_S:
+            self._began_s, self._number = self._clock(), 0
+        self._number += 1
+        return self._number if str(self._number).rstrip("0") == "1" else None
+
+
 async def reader(request: Request, bearer: Bearer) -> Actor:
     """Return the name of a caller who may read: any token, or any person who is logged in.
 
     Raises:
         HTTPException: 401, neither a valid token nor a log-in.
     """
-    who, role = _known(request, bearer)
+    who, role = await _known(request, bearer)
     return Actor(who=who, role=role)
 
 
@@ -43,7 +68,7 @@ def changer(right: Right) -> Callable[[Request, HTTPAuthorizationCredentials | N
     """Make a dependency for what changes something. A browser's order needs the page's token beside the cookie."""
 
     async def check(request: Request, bearer: Bearer) -> Actor:
-        who, role = _known(request, bearer)
+        who, role = await _known(request, bearer)
         if bearer is None:
             await genuine(request)
         if right not in RIGHTS[role]:
@@ -53,12 +78,26 @@ def changer(right: Right) -> Callable[[Request, HTTPAuthorizationCredentials | N
     return check
 
 
-def _known(request: Request, bearer: HTTPAuthorizationCredentials | None) -> tuple[str, Role]:
+async def _note_refused(request: Request) -> None:
+    state = request.app.state
+    if not hasattr(state, "refused_tokens"):
+        state.refused_tokens = RefusedTokens()
+    number = state.refused_tokens.count()
+    if number is not None:
+        address = request.client.host if request.client else "unknown"
+        subject = f"from {address}, number {number} of this hour"
+        await hmi_of(request).gateway.note(PersonNoted(person=_API, what="token_refused", subject=subject))
+
+
+async def _known(request: Request, bearer: HTTPAuthorizationCredentials | None) -> tuple[str, Role]:
     if bearer is not None:
         token = bearer.credentials
         holder = tokens_of(request).holder(token) if len(token) <= LONGEST_TOKEN else None
         if holder is None:
-            raise HTTPException(401, "this token is not known; make one with `station api-token add`", _CHALLENGE)
+            await _note_refused(request)
+            raise HTTPException(
+                401, "this token is not known, or has expired; make one with `station api-token add`", _CHALLENGE
+            )
         return holder
     caller = caller_of(request)
     if not caller.name:

@@ -1,5 +1,6 @@
 """`station api-token`: the tokens of the systems that use the HTTP API."""
 
+import getpass
 import re
 from datetime import UTC, datetime
 from pathlib import Path
@@ -8,8 +9,15 @@ import click
 
 from hmi.api.tokens import NAME, ROLES, ApiTokens
 from hmi.web.roles import Role
+from station.records.audit import AuditEntry, append_audit
+from station.records.database import records_folder
+from station.records.direct_transaction import direct_transaction
 from station.settings.configuration import load_configuration
 
+_ROLE = "command line"
+_BY = click.option(
+    "--by", metavar="WHO", default=getpass.getuser, help="Who does it, for the audit trail. [default: your login]"
+)
 _CONFIG = click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
 
 
@@ -27,30 +35,44 @@ def api_token() -> None:
     show_default=True,
     help="A viewer's token reads; an operator's also begins and ends lots.",
 )
+@click.option(
+    "--days", type=click.IntRange(1, 3650), metavar="N", help="Valid for so many days. [default: until it is removed]"
+)
+@_BY
 @_CONFIG
-def add(name: str, role: str, config: Path | None) -> None:
-    """Create a token for the system NAME and print it, this once. It is valid at once, and until it is removed."""
+def add(name: str, role: str, days: int | None, by: str, config: Path | None) -> None:
+    """Create a token for the system NAME and print it, this once. It is valid at once."""
     if not re.match(NAME, name):
         raise click.BadParameter("expected at most 40 letters, digits, spaces and _ . -", param_hint="NAME")
-    click.echo(_tokens(config).add(name, Role(role)))
+    home = load_configuration(config).home
+    with direct_transaction(records_folder(home)) as connection:  # no token without its row, and no row without it
+        append_audit(
+            connection, AuditEntry(by, _ROLE, "token.added", f"token {name}", new={"role": role, "days": days})
+        )
+        token = ApiTokens(home / "hmi").add(name, Role(role), days)
+    click.echo(token)
 
 
 @api_token.command("list")
 @_CONFIG
 def list_all(config: Path | None) -> None:
     """List the tokens by their names; the tokens themselves are not stored."""
-    for name, token in sorted(_tokens(config).all().items()):
-        made = datetime.fromtimestamp(token.made_utc_ms / 1000, UTC)
-        click.echo(f"{name:40}  {token.role:10}  made {made:%Y-%m-%d %H:%M} UTC")
+    for name, token in sorted(ApiTokens(load_configuration(config).home / "hmi").all().items()):
+        ends = "" if token.expires_utc_ms is None else f", expires {_time(token.expires_utc_ms)}"
+        click.echo(f"{name:40}  {token.role:10}  made {_time(token.made_utc_ms)}{ends}")
 
 
 @api_token.command()
 @click.argument("name")
+@_BY
 @_CONFIG
-def remove(name: str, config: Path | None) -> None:
+def remove(name: str, by: str, config: Path | None) -> None:
     """Withdraw the token of the system NAME; its next request is refused."""
-    _tokens(config).remove(name)
+    home = load_configuration(config).home
+    with direct_transaction(records_folder(home)) as connection:
+        append_audit(connection, AuditEntry(by, _ROLE, "token.removed", f"token {name}"))
+        ApiTokens(home / "hmi").remove(name)
 
 
-def _tokens(config: Path | None) -> ApiTokens:
-    return ApiTokens(load_configuration(config).home / "hmi")
+def _time(utc_ms: int) -> str:
+    return f"{datetime.fromtimestamp(utc_ms / 1000, UTC):%Y-%m-%d %H:%M} UTC"

@@ -3,6 +3,7 @@
 import hashlib
 import hmac
 import json
+import math
 import secrets
 import time
 from collections.abc import Mapping
@@ -22,6 +23,9 @@ ROLES = (Role.VIEWER, Role.OPERATOR)
 """A viewer's token reads; an operator's also begins and ends lots."""
 
 
+_DAY_MS = 86_400_000
+
+
 class Token(BaseModel):
     """One token's stored data."""
 
@@ -30,6 +34,8 @@ class Token(BaseModel):
     sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
     """Of the token; it has 256 bits of chance, so that a plain hash is as good as a slow one."""
     made_utc_ms: int
+    expires_utc_ms: int | None = None
+    """None for a token that is valid until it is removed."""
 
 
 class _File(BaseModel):
@@ -60,21 +66,23 @@ class ApiTokens:
         return self._tokens
 
     def holder(self, token: str) -> tuple[str, Role] | None:
-        """Return the owner of a token and its role; None if it is unknown, or the file cannot be read."""
+        """Return the owner of a token and its role; None if it is unknown or expired, or the file cannot be read."""
         sha256 = hashlib.sha256(token.encode("utf-8", "replace")).hexdigest()
         try:
             self._refresh()
         except StationError:
             return None
-        found = [(name, each.role) for name, each in self._tokens.items() if hmac.compare_digest(each.sha256, sha256)]
-        return found[0] if found else None
+        found = [(name, each) for name, each in self._tokens.items() if hmac.compare_digest(each.sha256, sha256)]
+        valid = [(name, each.role) for name, each in found if (each.expires_utc_ms or math.inf) > _utc_ms()]
+        return valid[0] if valid else None
 
-    def add(self, name: str, role: Role) -> str:
+    def add(self, name: str, role: Role, days: int | None = None) -> str:
         """Create a token and return it; it cannot be read again.
 
         Args:
             name: the owner, for the audit trail.
             role: the token's role.
+            days: how long it is valid; None until it is removed.
 
         Raises:
             BadInputError: the name is in use.
@@ -87,7 +95,9 @@ class ApiTokens:
             raise BadInputError(f"there are {MOST_TOKENS} tokens already; remove one first")
         token = PREFIX + secrets.token_urlsafe(32)
         sha256 = hashlib.sha256(token.encode()).hexdigest()
-        made = Token(role=role, sha256=sha256, made_utc_ms=time.time_ns() // 1_000_000)
+        now_ms = _utc_ms()
+        expires_ms = None if days is None else now_ms + days * _DAY_MS
+        made = Token(role=role, sha256=sha256, made_utc_ms=now_ms, expires_utc_ms=expires_ms)
         self._write({**self._tokens, name: made})
         return token
 
@@ -120,8 +130,12 @@ class ApiTokens:
     def _write(self, tokens: dict[str, Token]) -> None:
         try:
             self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            data = _File(version=1, tokens=tokens).model_dump_json(indent=1)
+            data = _File(version=1, tokens=tokens).model_dump_json(indent=1, exclude_none=True)
             write_atomically(self._path, data.encode(), 0o600)
         except OSError as error:
             raise StationError(f"{self._path} cannot be written: {error.strerror}; make its folder writable") from error
         self._tokens, self._seen = tokens, None
+
+
+def _utc_ms() -> int:
+    return time.time_ns() // 1_000_000

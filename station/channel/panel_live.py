@@ -74,7 +74,16 @@ class PersonNoted(ChannelMessage):
     purpose: ClassVar[str] = "to note who is at the panel"
     person: Actor
     what: Literal[
-        "logged_in", "log_in_refused", "logged_out", "idle", "added", "changed", "removed", "cleaning", "unlocked"
+        "logged_in",
+        "log_in_refused",
+        "logged_out",
+        "idle",
+        "added",
+        "changed",
+        "removed",
+        "cleaning",
+        "unlocked",
+        "token_refused",
     ]
     subject: str = Field(default="", max_length=200)
 

@@ -1,6 +1,7 @@
 """The HTTP API as a plant's system uses it, and as somebody who should not."""
 
 import re
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -109,6 +110,23 @@ def test_nobody_reads_without_a_token(api: Any, path: str) -> None:
     assert api("GET", path).status == 401
     assert api("GET", path, token="fst_" + "x" * 43).status == 401
     assert api("GET", path, token="x" * 5000).status == 401
+
+
+def test_refused_tokens_are_in_the_audit_trail(api: Any, site: Any) -> None:
+    for _ in range(12):
+        assert api("GET", "/api/v1/health", token="fst_" + "y" * 43).status == 401
+
+    def rows() -> list[str]:
+        with open_records(site.home / "records") as connection:
+            return [row.subject for row in read_audit(connection, 100, "panel.token_refused")]
+
+    until_s = time.monotonic() + 20.0
+    while len(rows()) < 2 and time.monotonic() < until_s:
+        time.sleep(0.05)
+    assert [subject.partition(",")[2] for subject in rows()][:2] == [
+        " number 1 of this hour",
+        " number 10 of this hour",
+    ]
 
 
 def test_a_withdrawn_token_counts_no_more(site: Any, api: Any, token_of: Any) -> None:
