@@ -1,8 +1,9 @@
 """Rate-limited log: a flood of requests cannot fill it."""
 
 import logging
-from collections import Counter
-from dataclasses import dataclass
+from collections import Counter, defaultdict
+
+from station.allowance import Allowance
 
 BURST = 20
 """Lines of one kind at once."""
@@ -12,18 +13,12 @@ SUMMARY_S = 10.0
 """Period of the summary of omitted lines."""
 
 
-@dataclass(slots=True)
-class _Allowance:
-    lines: float
-    at_s: float
-
-
 class LimitedLog:
     """Writes lines of each kind up to an allowance that refills, and reports the number of omitted lines."""
 
     def __init__(self, log: logging.Logger) -> None:
         self._log = log
-        self._allowances: dict[str, _Allowance] = {}
+        self._allowances: defaultdict[str, Allowance] = defaultdict(lambda: Allowance(BURST, REFILL_S))
         self._left_out: Counter[str] = Counter()
         self._summed_up_s = float("-inf")
 
@@ -37,16 +32,10 @@ class LimitedLog:
             message: with the arguments' places, as `logging` takes it.
             arguments: formatted only if the line is written.
         """
-        allowance = self._allowances.get(kind)
-        if allowance is None:
-            allowance = self._allowances[kind] = _Allowance(BURST, now_s)
-        allowance.lines = min(BURST, allowance.lines + (now_s - allowance.at_s) / REFILL_S)
-        allowance.at_s = now_s
-        if allowance.lines < 1:
+        if self._allowances[kind].take(now_s):
+            self._log.log(level, message, *arguments)
+        else:
             self._left_out[kind] += 1
-            return
-        allowance.lines -= 1
-        self._log.log(level, message, *arguments)
 
     def sum_up(self, now_s: float, *, last: bool = False) -> None:
         """Log the number of omitted lines, if any and if the last summary is long enough ago.
