@@ -52,7 +52,8 @@ def serve_ours(port: int, *, priority: bool) -> None:
     logging.disable(logging.CRITICAL)
 
     async def serve() -> None:
-        settings = ModbusSettings(port=port, max_connections=2 * max(CLIENTS))
+        most = 2 * max(CLIENTS)
+        settings = ModbusSettings(port=port, max_connections=most, max_per_address=most)
         await ModbusServer(settings, RegisterImage(), lambda *_: None, lambda *_: None).start()
         if priority:
             request_real_time_priority()

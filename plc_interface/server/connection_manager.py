@@ -83,8 +83,8 @@ class ConnectionManager:
         if right is Right.NONE:
             self.note(Trouble.NOT_ALLOWED, peer, "its certificate has no role known here: its connection is closed")
             return None
-        if len(self._members) >= self._settings.max_connections and not self._has_reserve(peer):
-            self.note(Trouble.TOO_MANY, peer, f"{len(self._members)} are connected: its connection is closed")
+        if (full := self._full(peer)) and not self._has_reserve(peer):
+            self.note(Trouble.TOO_MANY, peer, f"{full}: its connection is closed")
             return None
         self._members[peer] = member
         self.statistics.connections += 1
@@ -134,12 +134,25 @@ class ConnectionManager:
         except Exception as error:  # noqa: BLE001 (a fault of ours must not keep the connections from being swept)
             self.note(Trouble.DEVICE_FAILURE, peer, f"the handshake failed on a change of the writer: {error!r}")
 
+    def _full(self, peer: Peer) -> str:
+        """Return why there is no place for a client; empty where there is one."""
+        if len(self._members) >= self._settings.max_connections:
+            return f"{len(self._members)} are connected"
+        own = self._own(peer)
+        return f"{own} of its address are connected" if own >= self._settings.max_per_address else ""
+
+    def _own(self, peer: Peer) -> int:
+        return sum(other.address == peer.address for other in self._members)
+
     def _has_reserve(self, peer: Peer) -> bool:
-        if len(self._members) >= self._settings.max_connections + RESERVED_PLACES or not peer.may_write:
+        settings = self._settings
+        if not peer.may_write or len(self._members) >= settings.max_connections + RESERVED_PLACES:
+            return False
+        if self._own(peer) >= settings.max_per_address + RESERVED_PLACES:
             return False
         if self.write_lock.last_address:
             return peer.address == self.write_lock.last_address
-        return all(other.address != peer.address for other in self._members)
+        return not self._own(peer)
 
     def _sweep(self) -> None:
         self._sweeping = self._loop.call_later(SWEEP_S, self._sweep)

@@ -96,6 +96,14 @@ class ModbusSettings(Settings):
         ge=1,
         le=512,
     )
+    max_per_address: int = setting(
+        8,
+        title="Connections of one address",
+        description="Connections at one time of one address, so that no reader takes all places; four more for the "
+        "writer to reconnect.",
+        ge=1,
+        le=512,
+    )
     idle_timeout_s: float = setting(
         60.0,
         title="Idle time-out",

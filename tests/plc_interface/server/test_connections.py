@@ -44,10 +44,28 @@ class TestLimit:
         crowd(serving.settings.port, 200, "127.0.0.9")
         troubles = serving.server.statistics.troubles
         serving.wait(lambda: troubles[Trouble.TOO_MANY] >= 200 - serving.settings.max_connections)
-        assert serving.call(lambda: serving.server.connections) == serving.settings.max_connections
+        assert serving.call(lambda: serving.server.connections) == 1 + serving.settings.max_per_address
         assert plc.write(TRIGGER_ID, 7)[0] == 16
         assert serving.server.writer is not None
         assert sum(len(line) for line in caplog.messages) < 20_000
+
+    def test_one_reader_leaves_places_to_the_others(self, serve, connect, crowd):
+        serving = serve(max_per_address=5, writers=())
+        crowd(serving.settings.port, 40, "127.0.0.9")
+        serving.wait(lambda: serving.server.statistics.troubles[Trouble.TOO_MANY] >= 35)
+        others = [connect(serving, f"127.0.1.{number}") for number in range(27)]
+        assert all(other.ask(READ) == GOOD for other in others)
+        assert serving.call(lambda: serving.server.connections) == 32
+        assert connect(serving, "127.0.2.1").is_closed()
+
+    def test_the_writer_comes_back_beside_connections_that_it_lost(self, serve, connect, crowd):
+        serving = serve(max_per_address=2)
+        plc = connect(serving)
+        plc.claim()
+        crowd(serving.settings.port, 20, "127.0.0.1")
+        serving.wait(lambda: serving.server.statistics.troubles[Trouble.TOO_MANY] >= 15)
+        assert serving.call(lambda: serving.server.connections) == 2 + RESERVED_PLACES
+        assert plc.write(TRIGGER_ID, 7)[0] == 16
 
     def test_the_writer_comes_back_into_a_full_house(self, serve, connect, crowd):
         serving = serve(max_connections=8)
@@ -103,7 +121,7 @@ class TestTime:
     def test_slow_requests_are_parted_from_and_others_served(self, serve, connect, eventually, caplog):
         serving = serve(frame_timeout_s=0.5)
         plc = connect(serving)
-        slow = [connect(serving, "127.0.0.9") for _ in range(10)]
+        slow = [connect(serving, "127.0.0.9") for _ in range(8)]
         for wire in slow:
             wire.send(b"\0\1\0\0\0\xfe\1")
 
@@ -113,7 +131,7 @@ class TestTime:
                 with contextlib.suppress(OSError):
                     wire.send(b"\0")
             assert plc.ask(READ) == GOOD
-            return serving.server.statistics.troubles[Trouble.UNFINISHED] == 10
+            return serving.server.statistics.troubles[Trouble.UNFINISHED] == 8
 
         eventually(drip)
         assert serving.call(lambda: serving.server.connections) == 1
