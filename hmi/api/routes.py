@@ -1,9 +1,11 @@
 """The HTTP API for a plant's own systems: results, recipes, lots, health. Described at `/api/openapi.json`."""
 
+import re
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, HTTPException, Path, Query
+from pydantic import BeforeValidator
 
 from hmi.api.access import changer, reader
 from hmi.api.model import (
@@ -40,6 +42,7 @@ from station.vocabulary import OutcomeName, Reason
 
 IN_SCHEMA = True
 DEADLINE_S = 20.0
+_DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 _TEXT = {"text/plain": {"schema": {"type": "string"}}}
 _REFUSED: dict[int | str, dict[str, Any]] = {
     401: {"model": Error, "description": "Neither a known token nor a person who is logged in."},
@@ -51,10 +54,21 @@ _REFUSED: dict[int | str, dict[str, Any]] = {
 }
 _NOT_FOUND: dict[int | str, dict[str, Any]] = {404: {"model": Error, "description": "There is none."}}
 
+_UNREADABLE: dict[int | str, dict[str, Any]] = {400: {"model": Error, "description": "The body cannot be read."}}
+
+
+def _written_as_date(text: str) -> str:
+    if not _DATE.match(text):
+        raise ValueError("give a date and time of ISO 8601, as 2026-11-23T08:00:00Z")
+    return text
+
+
 router = APIRouter(prefix="/api/v1", responses=_REFUSED)
 Reader = Annotated[Actor, Depends(reader)]
 LotChanger = Annotated[Actor, Depends(changer(Right.RUN))]
 Text = Annotated[str, Query(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+Moment = Annotated[datetime, BeforeValidator(_written_as_date)]
+"""A number is none, of which nobody says whether it counts seconds or milliseconds."""
 RecipeName = Annotated[str, Path(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
 Sequence = Annotated[int, Path(ge=1, lt=2**32)]
 EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo=UTC)
@@ -91,8 +105,8 @@ async def inspections(
     fruit: Text | None = None,
     outcome: OutcomeName | None = None,
     reason: Reason | None = None,
-    begun_from: Annotated[datetime | None, Query(alias="from", description="Begun then or later.")] = None,
-    begun_to: Annotated[datetime | None, Query(alias="to", description="Begun before then.")] = None,
+    begun_from: Annotated[Moment | None, Query(alias="from", description="Begun then or later.")] = None,
+    begun_to: Annotated[Moment | None, Query(alias="to", description="Begun before then.")] = None,
     limit: Annotated[int, Query(ge=1, le=100)] = 50,
     below: Annotated[int | None, Query(ge=1, le=2**32, description="From the page before.")] = None,
 ) -> InspectionList:
@@ -156,7 +170,7 @@ async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAn
     return LotAnswer.of(found[0])
 
 
-@router.put("/lots/{name}", tags=["lots"])
+@router.put("/lots/{name}", tags=["lots"], responses=_UNREADABLE)
 async def begin_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()], begin: LotBegin) -> LotAnswer:
     """Begin a lot, by the name that the PLC gives with each trigger. Idempotent."""
     query = StartLot(name=name, grower=begin.grower, actor=actor)

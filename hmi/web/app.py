@@ -7,11 +7,10 @@ import uuid
 from collections.abc import AsyncIterator
 
 from fastapi import FastAPI, Request
-from fastapi.exception_handlers import request_validation_exception_handler
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
-from starlette.routing import Route
+from starlette.routing import Match, Route
 
 from hmi.api.model import ApiMessage, Error
 from hmi.past.past import PanelBusyError, Past, RecordsError
@@ -123,13 +122,24 @@ async def _http(request: Request, error: Exception) -> Response:
     key = {404: "problem.not_found", 405: "problem.not_found"}.get(error.status_code)
     answer = _problem_answer(request, error.status_code, locale_of(request).text(key) if key else str(error.detail))
     answer.headers.update(error.headers or {})
+    if error.status_code == 405:
+        answer.headers["allow"] = ", ".join(sorted(_methods(request)))
     return answer
+
+
+def _methods(request: Request) -> set[str]:
+    """Return the methods of a path, which several routes may serve."""
+    routes = [route for module in modules() for route in module.router.routes if isinstance(route, Route)]
+    found = [route for route in routes if route.matches(request.scope)[0] is not Match.NONE]
+    return {method for route in found for method in route.methods or ()}
 
 
 async def _bad_form(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)  # noqa: S101 (what it is registered for)
     if request.url.path.startswith("/api/"):
-        return await request_validation_exception_handler(request, error)
+        # Without what was sent: it may be no JSON, as 1e999 is read as infinity.
+        wrong = [{key: each[key] for key in ("type", "loc", "msg")} for each in error.errors()]
+        return JSONResponse({"detail": wrong}, 422)
     return _problem_answer(request, 400, locale_of(request).text("problem.bad_form"))
 
 

@@ -1,6 +1,7 @@
 """Security middleware: checks of every request before a page gets it, and the headers of every answer."""
 
 import contextlib
+import re
 from collections.abc import Iterable
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -21,11 +22,12 @@ HEADERS = {
     "cross-origin-resource-policy": "same-origin",
     "permissions-policy": "camera=(), microphone=(), geolocation=(), usb=(), serial=()",
 }
+_HOST = re.compile(r"(?:\[(?P<address>[0-9A-Fa-f:.]+)\]|(?P<name>[A-Za-z0-9.-]+))(?::[0-9]{1,5})?")
 _SECURE = {"strict-transport-security": "max-age=31536000"}
 
 
-class TooLargeError(Exception):
-    """A request body above the limit."""
+class BodyError(Exception):
+    """A request body that is too large, or whose client has gone."""
 
 
 class SecurityMiddleware:
@@ -62,22 +64,23 @@ class SecurityMiddleware:
             await self._within_size(scope, receive, send_with_headers)
 
     async def _within_size(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve a request whose body may be larger than its header states."""
-        taken = 0
+        """Serve a request whose body may be larger than its header states, or not come to its end."""
+        taken, more = 0, True
 
         async def take() -> Message:
-            nonlocal taken
+            nonlocal taken, more
             message = await receive()
             taken += len(message.get("body", b""))
-            if taken > LARGEST_BODY_BYTES:
-                raise TooLargeError
+            if taken > LARGEST_BODY_BYTES or (more and message["type"] == "http.disconnect"):
+                raise BodyError
+            more = message.get("more_body", False)
             return message
 
         async def send_if_small(message: Message) -> None:
             if taken <= LARGEST_BODY_BYTES:  # else the framework's answer hides the cause
                 await send(message)
 
-        with contextlib.suppress(TooLargeError):
+        with contextlib.suppress(BodyError):
             await self._app(scope, take, send_if_small)
         if taken > LARGEST_BODY_BYTES:
             await _too_large()(scope, receive, send)
@@ -100,9 +103,9 @@ class SecurityMiddleware:
 
 
 def _name_of(host: str) -> str:
-    """Return a Host header's name without its port."""
-    name = host[: host.rindex("]") + 1].strip("[]") if "]" in host else host.partition(":")[0]
-    return name.lower()
+    """Return a Host header's name without its port; empty where it is neither a name nor an address."""
+    found = _HOST.fullmatch(host)
+    return (found["address"] or found["name"]).lower() if found else ""
 
 
 def _too_large() -> PlainTextResponse:

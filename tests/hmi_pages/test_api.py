@@ -141,6 +141,34 @@ def test_a_readers_token_changes_nothing(api: Any, reading: str) -> None:
     assert api("GET", "/api/v1/lots/NO", token=reading).status == 404
 
 
+def test_a_number_that_json_has_not_is_an_invalid_value(api: Any, writing: str) -> None:
+    order = {"token": writing, "content_type": "application/json"}
+    answer = api("PUT", "/api/v1/lots/NO", b'{"grower": 1e999}', **order)
+    assert answer.status == 422
+    assert answer.body["detail"][0]["loc"] == ["body", "grower"]
+    assert api("PUT", "/api/v1/lots/NO", b'{"grower": "\xff"}', **order).status == 400
+
+
+@pytest.mark.parametrize("method", ["OPTIONS", "DELETE"])
+def test_what_a_path_allows_is_whole(api: Any, writing: str, method: str) -> None:
+    answer = api(method, "/api/v1/lots/NO", token=writing)
+    assert (answer.status, answer.headers["allow"]) == (405, "GET, PUT")
+    assert api(method, "/api/v1/lots/NO/end", token=writing).headers["allow"] == "POST"
+
+
+@pytest.mark.parametrize("moment", ["0.5", "20261123", "1763884800", "now", "-1", "2026-13-01", "12:00", "%20"])
+def test_only_a_date_is_a_date(api: Any, reading: str, moment: str) -> None:
+    for name in ("from", "to"):
+        assert api("GET", f"/api/v1/inspections?{name}={moment}", token=reading).status == 422
+
+
+@pytest.mark.parametrize(
+    "moment", ["2026-11-23T08:00:00Z", "2026-11-23T08:00", "2026-11-23", "2026-11-23T08:00%2B01:00"]
+)
+def test_a_date_has_a_time_and_an_offset_or_not(api: Any, reading: str, moment: str) -> None:
+    assert api("GET", f"/api/v1/inspections?from={moment}", token=reading).status == 200
+
+
 def test_foreign_pages_names_and_too_much_are_refused(api: Any, writing: str) -> None:
     order = {"token": writing, "json_body": {"grower": "x"}}
     assert api("PUT", "/api/v1/lots/NO", **order, origin="https://evil.example").status == 403
