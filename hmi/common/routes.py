@@ -1,21 +1,29 @@
 """Common layout of all pages: alarm line, station state, live stream, language."""
 
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Form, Query, Request
 from starlette.responses import Response, StreamingResponse
 
-from hmi.web.access import LANGUAGE_COOKIE, PANEL_COOKIE, GenuineCaller, HmiNow, LocaleNow, caller_of
+from hmi.web.access import (
+    LANGUAGE_COOKIE,
+    PANEL_COOKIE,
+    GenuineCaller,
+    HmiNow,
+    LocaleNow,
+    address_of,
+    caller_of,
+)
 from hmi.web.gateway import Gateway
 from hmi.web.live import Part
 from hmi.web.page import go_to
 from hmi.web.problem import Problem
+from hmi.web.streams import Stream
 from hmi.web.translation import Locale
 
 router = APIRouter()
 MOST_PARTS = 20
-MOST_STREAMS = 40
 _A_YEAR_S = 365 * 24 * 3600
 
 
@@ -51,21 +59,11 @@ async def live(
     """Send server-sent events with a page's parts; see `hmi.live`."""
     if hmi.live.unknown(part):
         raise Problem(404, "problem.not_found")
-    if hmi.live.open >= MOST_STREAMS:
-        raise Problem(503, "problem.too_many")
-    session = caller_of(request).session
-
-    async def stream() -> AsyncIterator[bytes]:
-        hmi.live.open += 1
-        try:
-            async for event in hmi.live.stream(
-                tuple(dict.fromkeys(part)), locale, lambda: hmi.sessions.caller(session)
-            ):
-                yield event
-        finally:
-            hmi.live.open -= 1
-
-    return StreamingResponse(stream(), media_type="text/event-stream")
+    caller, address = caller_of(request), address_of(request)
+    holder = f"person {caller.name}" if caller.name else address
+    stream = Stream(holder, known=bool(caller.name) or hmi.pins.knows(address))
+    events = hmi.live.stream(stream, tuple(dict.fromkeys(part)), locale, lambda: hmi.sessions.caller(caller.session))
+    return StreamingResponse(events, media_type="text/event-stream")
 
 
 @router.get("/panel")

@@ -56,7 +56,6 @@ define(
 define("problem.replayed", "This command was already sent; it is not carried out twice.")
 define("problem.old", "The page was open for too long. Reload it and try again.")
 define("problem.bad_form", "The data sent is incomplete or invalid.")
-define("problem.too_many", "Too many pages are open. Close some.")
 define(
     "problem.no_answer",
     "The station did not answer in time. Its state shows whether the command was carried out.",

@@ -6,7 +6,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Form, Query, Request
 from starlette.responses import Response
 
-from hmi.web.access import GenuineCaller, HmiNow, orders
+from hmi.web.access import GenuineCaller, HmiNow, address_of, orders
 from hmi.web.context import Hmi
 from hmi.web.gateway import actor_of
 from hmi.web.navigation import Entry
@@ -16,10 +16,10 @@ from hmi.web.roles import Right, Role
 from hmi.web.sessions import Caller
 from hmi.web.user_store import UserStoreError, least_digits
 from station.channel.panel_live import PersonNoted
+from station.supervision.guard import is_loopback
 
 router = APIRouter()
 ENTRY = Entry("people", "/people")
-LOOPBACK = ("127.", "::1")
 Name = Annotated[str, Form(max_length=40)]
 Pin = Annotated[str, Form(max_length=20)]
 Back = Annotated[str, Form(max_length=200)]
@@ -37,7 +37,7 @@ async def people(request: Request, hmi: HmiNow, back: Annotated[str, Query(max_l
 @router.post("/people/begin")
 async def begin(request: Request, hmi: HmiNow, _: GenuineCaller, name: Name, pin: Pin, again: Pin) -> Response:
     """Set the administrator's PIN at the first start, at the machine itself."""
-    if not _address(request).startswith(LOOPBACK):
+    if not is_loopback(address_of(request)):
         raise Problem(403, "people.only_here")
     if pin != again:
         return _page(request, hmi, "/", "people.pin_differs")
@@ -55,19 +55,20 @@ async def log_in(
     request: Request, hmi: HmiNow, caller: GenuineCaller, name: Name, pin: Pin, back: Back = "/"
 ) -> Response:
     """Log in; after several wrong PINs each further try is delayed."""
-    keys = (f"name {name if name in hmi.people.names() else ''}", f"address {_address(request)}")
-    if (wait_s := hmi.pins.wait_s(*keys)) > 0:
+    who = name if name in hmi.people.names() else "", address_of(request)
+    if (wait_s := hmi.pins.wait_s(*who)) > 0:
         return _page(request, hmi, back, "people.wait", str(int(wait_s) + 1), status=429, chosen=name)
-    hmi.pins.tried(*keys)
-    async with _CHECKING:
+    hmi.pins.tried(*who)
+    async with _CHECKING:  # a change of this PIN, which comes after it, ends this session too
         role = await asyncio.to_thread(hmi.people.check, name, pin)
-    if role is None:
-        await _note(hmi, Caller(name, Role.VIEWER, ""), "log_in_refused", _address(request))
+        answer = None if role is None else _logged_in(request, hmi, name, role, back)
+    if role is None or answer is None:
+        await _note(hmi, Caller(name, Role.VIEWER, ""), "log_in_refused", address_of(request))
         return _page(request, hmi, back, "people.wrong_pin", status=403, chosen=name)
-    hmi.pins.right(*keys)
+    hmi.pins.right(*who)
     hmi.sessions.log_out(caller.session)
-    await _note(hmi, Caller(name, role, ""), "logged_in", _address(request))
-    return _logged_in(request, hmi, name, role, back)
+    await _note(hmi, Caller(name, role, ""), "logged_in", address_of(request))
+    return answer
 
 
 @router.post("/people/log-out")
@@ -81,40 +82,41 @@ async def log_out(hmi: HmiNow, caller: GenuineCaller) -> Response:
 
 @router.post("/people/own-pin")
 async def own_pin(request: Request, hmi: HmiNow, caller: GenuineCaller, old: Pin, pin: Pin) -> Response:
-    """Change one's own PIN."""
+    """Change one's own PIN; one's other sessions end."""
     if not caller.name:
         raise Problem(403, "problem.not_allowed", role=Role.OPERATOR)
-    key = f"name {caller.name}"
-    if (wait_s := hmi.pins.wait_s(key)) > 0:
+    who = caller.name, address_of(request)
+    if (wait_s := hmi.pins.wait_s(*who)) > 0:
         return _page(request, hmi, "/", "people.wait", str(int(wait_s) + 1), status=429)
-    hmi.pins.tried(key)
+    hmi.pins.tried(*who)
     async with _CHECKING:
-        if await asyncio.to_thread(hmi.people.check, caller.name, old) is None:
+        role = await asyncio.to_thread(hmi.people.check, caller.name, old)
+        if role is None:
             return _page(request, hmi, "/", "people.wrong_pin", status=403)
-        hmi.pins.right(key)
+        hmi.pins.right(*who)
         try:
-            await asyncio.to_thread(hmi.people.put, caller.name, caller.role, pin)
+            await asyncio.to_thread(hmi.people.put, caller.name, role, pin)
         except UserStoreError as error:
             return _page(request, hmi, "/", error.key, error.detail)
+        hmi.sessions.forget(caller.name)
     await _note(hmi, caller, "changed", caller.name)
-    return go_to("/people")
+    return _logged_in(request, hmi, caller.name, role, "/people")
 
 
 @router.post("/people/put")
 async def put(
     request: Request, hmi: HmiNow, caller: Admin, name: Name, role: Annotated[Role, Form()], pin: Pin = ""
 ) -> Response:
-    """Add a user, or change a user's role or PIN; that user is logged out."""
+    """Add a user, or change a user's role or PIN; that user's sessions end, one's own other sessions too."""
     known = name in hmi.people.names()
     try:
         async with _CHECKING:
             await asyncio.to_thread(hmi.people.put, name, role, pin)
+            hmi.sessions.forget(name)
     except UserStoreError as error:
         return _page(request, hmi, "/", error.key, error.detail)
-    if name != caller.name:
-        hmi.sessions.forget(name)
     await _note(hmi, caller, "changed" if known else "added", f"{name}: {role}")
-    return go_to("/people")
+    return _logged_in(request, hmi, name, role, "/people") if name == caller.name else go_to("/people")
 
 
 @router.post("/people/remove")
@@ -149,7 +151,7 @@ def _page(
         chosen=chosen,
         people=hmi.people.names(),
         broken=hmi.people.broken,
-        here=_address(request).startswith(LOOPBACK),
+        here=is_loopback(address_of(request)),
         roles=[role for role in Role if role is not Role.VIEWER],
         least_digits={role: least_digits(role) for role in Role},
     )
@@ -164,10 +166,6 @@ def _logged_in(request: Request, hmi: Hmi, name: str, role: Role, back: str) -> 
 def _is_ours(address: str) -> bool:
     """Return whether the address to go back to is a page of ours, and not inserted by a foreign page."""
     return address.startswith("/") and not address.startswith(("//", "/\\")) and address.isprintable()
-
-
-def _address(request: Request) -> str:
-    return request.client.host if request.client else ""
 
 
 async def _note(hmi: Hmi, caller: Caller, what: str, subject: str = "") -> None:

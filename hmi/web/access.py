@@ -35,6 +35,11 @@ def locale_of(request: Request) -> Locale:
     return Locale(preferred(hmi_of(request).settings.languages, cookie, accepted))
 
 
+def address_of(request: Request) -> str:
+    """Return the address of the browser."""
+    return request.client.host if request.client else ""
+
+
 async def genuine(request: Request) -> Caller:
     """Return the caller of an order that one of our own pages has sent, for the first time.
 

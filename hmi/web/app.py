@@ -26,6 +26,7 @@ from hmi.web.problem import Problem
 from hmi.web.render import Renderer
 from hmi.web.security import SecurityMiddleware
 from hmi.web.sessions import Sessions
+from hmi.web.streams import stream_places
 from hmi.web.user_store import UserStore
 from station.channel.messages import ChannelError, DeadlineError
 from station.channel.panel_live import PersonNoted
@@ -57,7 +58,7 @@ def make_context(site: Configuration) -> Hmi:
         pins=LoginRateLimiter(),
         assets=assets,
         renderer=renderer,
-        live=Live(parts(), renderer, gateway, boot),
+        live=Live(parts(), renderer, gateway, boot, stream_places(settings.pages_per_address)),
         boot=boot,
         ball_recipe=site.calibration.recipe,
     )

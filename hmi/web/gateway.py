@@ -4,9 +4,12 @@ import asyncio
 import contextlib
 import logging
 import time
+from collections.abc import Callable
 from typing import Self, TypeVar
 
+from hmi.web.roles import Role
 from hmi.web.sessions import Caller
+from station.allowance import Allowance
 from station.channel.client import ChannelClient
 from station.channel.line import Noted
 from station.channel.messages import ChannelError, ChannelMessage, DeadlineError, RefusedError
@@ -19,6 +22,8 @@ STALE_S = 2.0
 """An older state is not shown as live."""
 DEADLINE_S = 2.0
 _POLL_DEADLINE_S = 1.0
+UNNAMED_BURST, UNNAMED_REFILL_S = 30, 60.0
+"""Audit rows that anybody can cause without a log-in: at once, and time for one more."""
 
 log = logging.getLogger(__name__)
 
@@ -46,6 +51,9 @@ class Gateway:
         """The last fruit."""
         self.recent = Recent(fruit=())
         """The last fruit in short."""
+        self.flooded_by: Callable[[], str] = str
+        """Returns the address that floods the pages with connections; empty for none. The station raises its alarm."""
+        self._unnamed, self._left_out = Allowance(UNNAMED_BURST, UNNAMED_REFILL_S), 0
 
     async def __aenter__(self) -> Self:
         self._client = ChannelClient(self._endpoint, "the station")
@@ -86,7 +94,17 @@ class Gateway:
         return await self._client.request(request, reply, deadline_s=deadline_s)
 
     async def note(self, what: PersonNoted) -> None:
-        """Write an event into the audit trail, and into the log if the station does not answer."""
+        """Write an event into the audit trail, and into the log if the station does not answer.
+
+        Of events of callers who are not logged in only so many are written; the next row has the number left out.
+        """
+        if what.person.role == Role.VIEWER:
+            if not self._unnamed.take(time.monotonic()):
+                self._left_out += 1
+                return
+            if self._left_out:
+                what = what.model_copy(update={"subject": f"{what.subject} ({self._left_out} rows before it left out)"})
+                self._left_out = 0
         log.info("%s (%s): %s %s", what.person.who, what.person.role, what.what, what.subject)
         try:
             await self.request(what, Noted)
@@ -101,7 +119,8 @@ class Gateway:
         while True:
             began_s = time.monotonic()
             with contextlib.suppress(ChannelError):
-                state = await self.request(GetPanelState(), PanelState, deadline_s=_POLL_DEADLINE_S)
+                asked = GetPanelState(flooded_by=self.flooded_by())
+                state = await self.request(asked, PanelState, deadline_s=_POLL_DEADLINE_S)
                 if (newest := (state.boot, state.last_sequence)) != self._known:
                     self.recent = await self.request(GetRecent(most=200), Recent)
                     self.last, self._known = await self._fruit(state.last_sequence), newest

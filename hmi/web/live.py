@@ -12,8 +12,10 @@ from hmi.web.gateway import Gateway
 from hmi.web.render import Renderer
 from hmi.web.roles import RIGHTS, Right, Role
 from hmi.web.sessions import Caller
+from hmi.web.streams import Stream
 from hmi.web.translation import Locale
 from station.settings.hmi import Language
+from station.supervision.places import Places
 
 BEAT_S = 0.5
 """Period of a page's events if nothing changes."""
@@ -44,13 +46,15 @@ class Live:
         renderer: renders the templates.
         gateway: state of the station.
         boot: differs after each start of this process; then a page reloads itself.
+        places: of the streams.
     """
 
-    def __init__(self, parts: Mapping[str, Part], renderer: Renderer, gateway: Gateway, boot: str) -> None:
+    def __init__(
+        self, parts: Mapping[str, Part], renderer: Renderer, gateway: Gateway, boot: str, places: Places[Stream]
+    ) -> None:
         self._parts, self._renderer, self._gateway, self._boot = parts, renderer, gateway, boot
+        self.places = places
         self._filled: dict[tuple[str, Language, Role], tuple[object, Filled]] = {}
-        self.open = 0
-        """Streams under way."""
         self.ending = False
         """The process ends: streams end."""
 
@@ -78,18 +82,29 @@ class Live:
         return filled
 
     async def stream(
-        self, names: tuple[str, ...], locale: Locale, caller: Callable[[], Caller]
+        self, stream: Stream, names: tuple[str, ...], locale: Locale, caller: Callable[[], Caller]
     ) -> AsyncIterator[bytes]:
-        """Send server-sent events to one page until it closes. A slow browser gets fewer.
+        """Send server-sent events to one page until it closes or is displaced. A slow browser gets fewer.
 
         Args:
+            stream: gets its place with the first event, and leaves it with the last.
             names: the page's parts.
             locale: its language.
             caller: returns who is logged in there now; the page reloads itself when that changes.
         """
+        self.places.enter(stream)
+        try:
+            async for event in self._events(stream, names, locale, caller):
+                yield event
+        finally:
+            self.places.leave(stream)
+
+    async def _events(
+        self, stream: Stream, names: tuple[str, ...], locale: Locale, caller: Callable[[], Caller]
+    ) -> AsyncIterator[bytes]:
         sent: dict[str, str] = {}
         loop, beat_at_s = asyncio.get_running_loop(), 0.0
-        while not self.ending:
+        while not self.ending and not stream.displaced:
             who = caller()
             filled = {name: self.part(name, locale, who.role) for name in names}
             news = {name: each for name, each in filled.items() if sent.get(name) != each.digest}

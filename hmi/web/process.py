@@ -5,16 +5,20 @@ import logging
 import signal
 import ssl
 
-import uvicorn
+from starlette.types import ASGIApp
 
 from hmi.web.app import make_app, make_context
 from station.errors import BadInputError
 from station.settings.configuration import Configuration
 from station.settings.hmi import HmiSettings, address_of
+from station.supervision.guard import GuardedListener, Limits
 from station.supervision.notify import feed_watchdog, notify
-from station.supervision.serving import CLOSE_S, AddressError, Server, listen
+from station.supervision.serving import AddressError, Server, listen
 
 START_S = 30.0
+MOST_CONNECTIONS, RESERVED_CONNECTIONS = 200, 200
+"""Of all strangers together; of the station's own screen and the addresses where people have logged in."""
+CONNECTIONS_PER_PAGE = 3
 LOOPBACK = ("127.", "::1", "localhost")
 
 log = logging.getLogger(__name__)
@@ -33,9 +37,11 @@ async def serve(site: Configuration) -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, ended.set)
     hmi = make_context(site)
-    listener = listen(site.hmi.host, site.hmi.port, "hmi", "the pages")
-    server = Server(_config(site.hmi, make_app(hmi)))
-    serving = asyncio.create_task(server.serve(sockets=[listener]), name="pages")
+    limits = Limits(MOST_CONNECTIONS, CONNECTIONS_PER_PAGE * site.hmi.pages_per_address, RESERVED_CONNECTIONS)
+    listener = listen(site.hmi.host, site.hmi.port, "hmi", "the pages", limits, hmi.pins.knows)
+    hmi.gateway.flooded_by = lambda: listener.flooded_by
+    server = _server(listener, site.hmi, make_app(hmi))
+    serving = asyncio.create_task(server.run_until_exit(), name="pages")
     feeding: asyncio.Task[None] | None = None
     try:
         async with asyncio.timeout(START_S):
@@ -59,28 +65,21 @@ async def serve(site: Configuration) -> None:
         await serving
 
 
-def _config(settings: HmiSettings, app: object) -> uvicorn.Config:
+def _server(listener: GuardedListener, settings: HmiSettings, app: ASGIApp) -> Server:
+    """Make the server, and read its certificate."""
     tls = settings.tls
-    config = uvicorn.Config(
-        app,  # type: ignore[arg-type] (an ASGI application)
-        log_config=None,
-        access_log=False,
-        ws="none",
-        server_header=False,
-        proxy_headers=False,
-        limit_concurrency=200,
-        h11_max_incomplete_event_size=16 * 1024,
-        timeout_keep_alive=30,
-        timeout_graceful_shutdown=CLOSE_S,  # type: ignore[arg-type]
+    server = Server(
+        listener,
+        app,
         ssl_certfile=tls.certificate if tls.enabled else None,
         ssl_keyfile=tls.key if tls.enabled else None,
     )
     try:
-        config.load()
+        server.config.load()
     except (OSError, ssl.SSLError) as error:
         raise BadInputError(
             f"hmi.tls: {tls.certificate} and {tls.key} cannot be used: {error}; name a certificate and its key in PEM"
         ) from error
-    if config.ssl is not None:
-        config.ssl.minimum_version = ssl.TLSVersion.TLSv1_2
-    return config
+    if server.config.ssl is not None:
+        server.config.ssl.minimum_version = ssl.TLSVersion.TLSv1_2
+    return server

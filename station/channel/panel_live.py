@@ -92,6 +92,8 @@ class GetPanelState(ChannelMessage):
     """Query the operator's summary. Answered with `PanelState`."""
 
     purpose: ClassVar[str] = "for its state"
+    flooded_by: str = Field(default="", max_length=64)
+    """The address that floods the pages with connections; empty for none."""
 
 
 class RecipeNames(ChannelMessage):

@@ -62,6 +62,7 @@ class AlarmId(StrEnum):
     CALIBRATION_OLD = "calibration_old"
     HMI_LOST = "hmi_lost"
     OUTBOX_BEHIND = "outbox_behind"
+    CONNECTION_FLOOD = "connection_flood"
 
 
 class AlarmRow(NamedTuple):
@@ -124,6 +125,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     AlarmId.CALIBRATION_OLD: AlarmRow(31, Priority.LOW, texts.CALIBRATION_OLD),
     AlarmId.HMI_LOST: AlarmRow(32, Priority.LOW, texts.HMI_LOST),
     AlarmId.OUTBOX_BEHIND: AlarmRow(33, Priority.LOW, texts.OUTBOX_BEHIND),
+    AlarmId.CONNECTION_FLOOD: AlarmRow(34, Priority.LOW, texts.CONNECTION_FLOOD),
 }
 """Every alarm, in the order of its number."""
 

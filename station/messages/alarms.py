@@ -299,3 +299,17 @@ OUTBOX_BEHIND = AlarmTexts(
         "process.",
     ),
 )
+CONNECTION_FLOOD = AlarmTexts(
+    define(
+        "alarm.cause.connection_flood",
+        "Another machine opens more connections than allowed to the pages or the metrics, again and again.",
+    ),
+    define(
+        "alarm.consequence.connection_flood",
+        "Its own connections are closed; pages open slowly for others who are not logged in. Inspections continue.",
+    ),
+    define(
+        "alarm.action.connection_flood",
+        "Find the machine by the address in the detail, end its program, or pull its network cable.",
+    ),
+)

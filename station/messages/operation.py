@@ -7,6 +7,12 @@ INTERFACE_SILENT = define(
 )
 HEARTBEAT_STILL = define("operation.heartbeat_still", "the PLC's heartbeat does not change")
 PAGES_SILENT = define("operation.pages_silent", "the pages' process has sent no request for {age_s} s", age_s=Number(0))
+PAGES_FLOODED = define(
+    "operation.pages_flooded", "connections of {address} to the pages are turned away", address=Name()
+)
+METRICS_FLOODED = define(
+    "operation.metrics_flooded", "connections of {address} to the metrics are turned away", address=Name()
+)
 DISK_LOW = define(
     "operation.disk_low",
     "{free_mb} MB are free, {reserve_mb} MB are the reserve",

@@ -11,8 +11,10 @@ from pathlib import Path
 
 from station.channel.server import ChannelServer
 from station.errors import StationError
+from station.inspection.alarm_table import AlarmId
 from station.inspection.states import STATES
-from station.messages.message import verbatim
+from station.messages import operation as messages
+from station.messages.message import Message, verbatim
 from station.messages.supervision import TASK_ENDED
 from station.outbox.lag import OutboxMonitor
 from station.outbox.status import outbox_folder, read_status
@@ -126,12 +128,18 @@ class Station:
         production = Production(service, devices, book, lots, orders, interlock)
         alarm_orders = AlarmCommands(alarms, audit)
         panel = PanelServer(production, records, alarm_orders, audit)
+        health = HealthServer(
+            configuration.metrics.host, configuration.metrics.port, metrics, liveness, interlock.readiness, versions
+        )
         upkeep = Housekeeping(
             configuration,
             production,
             observability,
-            panel.hmi_fault,
-            OutboxMonitor(configuration.outbox, configuration.home).alarm_detail,
+            {
+                AlarmId.HMI_LOST: panel.hmi_fault,
+                AlarmId.OUTBOX_BEHIND: OutboxMonitor(configuration.outbox, configuration.home).alarm_detail,
+                AlarmId.CONNECTION_FLOOD: lambda: _flood(panel, health),
+            },
             verbatim(self._broken) if self._broken else None,
         )
         endpoint = _with_folder(line_endpoint(configuration.handshake, configuration.home))
@@ -139,9 +147,6 @@ class Station:
         tasks = [self._begin(stack, line.serve(), "line server")]
         pages = PanelPages(configuration, records, production, observability)
         await self._serve(stack, panel, pages)
-        health = HealthServer(
-            configuration.metrics.host, configuration.metrics.port, metrics, liveness, interlock.readiness, versions
-        )
         port = await health.start()
         stack.push_async_callback(health.close)
         await self._open_devices(stack, devices, pages)
@@ -211,6 +216,12 @@ class Station:
 
         stack.push_async_callback(end)
         return task
+
+
+def _flood(panel: PanelServer, health: HealthServer) -> Message | None:
+    if panel.flooded_by:
+        return messages.PAGES_FLOODED(address=panel.flooded_by)
+    return messages.METRICS_FLOODED(address=health.flooded_by) if health.flooded_by else None
 
 
 def _with_folder(endpoint: str) -> str:

@@ -82,6 +82,14 @@ class HmiSettings(Settings):
         ge=0.05,
         le=1.0,
     )
+    pages_per_address: int = setting(
+        16,
+        title="Pages per address",
+        description="Open pages with live data at one address, or of one person who is logged in; an address has three "
+        "connections for each. More where many browsers share an address, as behind a proxy.",
+        ge=4,
+        le=60,
+    )
     cleaning_s: float = setting(
         30.0,
         title="Cleaning time",

@@ -1,13 +1,16 @@
-"""Base of our HTTP servers: a listening socket with a clear error, and signals left to the process."""
+"""Base of our HTTP servers: a guarded listening socket with a clear error, and signals left to the process."""
 
 import contextlib
 import errno
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import uvicorn
+from starlette.types import ASGIApp
 
 from station.errors import StationError
+from station.supervision.guard import KEEP_ALIVE_S, MOST_AT_ONCE, GuardedListener, Limits, is_loopback
 
 CLOSE_S = 1.0
 """Maximum wait for pending answers when closing."""
@@ -18,7 +21,39 @@ class AddressError(StationError):
 
 
 class Server(uvicorn.Server):
-    """A server that leaves the process's signals to the process."""
+    """Server of one application on one listener. It leaves the process's signals to the process.
+
+    Args:
+        listener: guards its connections.
+        app: the application.
+        options: of `uvicorn.Config`, in addition.
+    """
+
+    def __init__(self, listener: GuardedListener, app: ASGIApp, **options: Any) -> None:
+        self._listener = listener
+        config = uvicorn.Config(
+            listener.guarded(app),
+            log_config=None,
+            access_log=False,
+            ws="none",
+            server_header=False,
+            proxy_headers=False,
+            backlog=MOST_AT_ONCE,
+            h11_max_incomplete_event_size=16 * 1024,
+            timeout_keep_alive=KEEP_ALIVE_S,
+            timeout_graceful_shutdown=CLOSE_S,  # type: ignore[arg-type]
+            **options,
+        )
+        super().__init__(config)
+
+    async def run_until_exit(self) -> None:
+        """Serve until `should_exit`."""
+        await self.serve(sockets=[self._listener])
+
+    async def on_tick(self, counter: int) -> bool:
+        """Disconnect overdue clients, ten times a second."""
+        self._listener.sweep()
+        return await super().on_tick(counter)
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -26,7 +61,9 @@ class Server(uvicorn.Server):
         yield
 
 
-def listen(host: str, port: int, setting: str, what: str) -> socket.socket:
+def listen(
+    host: str, port: int, setting: str, what: str, limits: Limits, known: Callable[[str], bool] = is_loopback
+) -> GuardedListener:
     """Return a listening socket, or raise one clear sentence.
 
     Args:
@@ -34,19 +71,21 @@ def listen(host: str, port: int, setting: str, what: str) -> socket.socket:
         port: TCP; 0 takes a free one.
         setting: the configuration's section with `host` and `port`.
         what: the service, as `the pages`.
+        limits: numbers of connections.
+        known: returns whether an address may use the reserve.
 
     Raises:
         AddressError: the port is in use, or the address is not this machine's.
     """
     try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        listener = socket.socket(family, kind, protocol)
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        listener = GuardedListener(family, limits, known)
     except OSError as error:
         raise AddressError(f"{setting}.host {host!r}: {error.strerror}; set an address of this machine") from error
     try:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(address)
-        listener.listen(64)
+        listener.listen(MOST_AT_ONCE)
         listener.settimeout(0)
     except OSError as error:
         listener.close()

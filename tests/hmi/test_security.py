@@ -2,11 +2,13 @@
 
 import json
 import stat
+import time
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hmi.web.gateway import UNNAMED_BURST, UNNAMED_REFILL_S, Gateway
 from hmi.web.login_limiter import FREE_TRIES, LONGEST_WAIT_S, LoginRateLimiter
 from hmi.web.roles import RIGHTS, Right, Role, least_role
 from hmi.web.security import LARGEST_BODY_BYTES
@@ -47,11 +49,19 @@ class TestRequests:
         assert " onclick" not in text
         assert 'src="http' not in text
 
-    @pytest.mark.parametrize("host", ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "", "[::2]"])
+    HOSTS = ("127.0.0.1:80@evil", "127.0.0.1:", "127.0.0.1:80:80", "evil@127.0.0.1", "[127.0.0.1]x", "127.0.0.1 ")
+
+    @pytest.mark.parametrize(
+        "host", ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "", "[::2]", *HOSTS]
+    )
     def test_another_hosts_name_is_refused(self, pages, host):
         status, headers, _ = pages("GET", "/", headers={"host": host})
         assert status == 421
         assert "default-src 'none'" in headers["content-security-policy"], "what is refused is no way around it"
+
+    @pytest.mark.parametrize("after", [":80@evil", "@evil", ":80:80", ":8080x", "]", ":808080", "\t"])
+    def test_our_name_with_more_behind_it_is_another(self, pages, after):
+        assert pages("GET", "/", headers={"host": "127.0.0.1" + after})[0] == 421
 
     @pytest.mark.parametrize(
         "headers",
@@ -199,6 +209,52 @@ class TestLogIn:
         assert pages.post("/people/remove", csrf=pages.token(), name="Ana")[0] == 303
         assert pages.context.sessions.caller(hers).role is Role.VIEWER
 
+    def test_a_changed_pin_or_role_ends_ones_other_sessions(self, pages):
+        pages.context.people.begin("admin", PIN)
+        pages.context.people.put("Ana", Role.OPERATOR, "7391")
+        sessions = pages.context.sessions
+        other, own = sessions.log_in("Ana", Role.OPERATOR), log_in(pages, "Ana", Role.OPERATOR)
+        assert pages.post("/people/own-pin", csrf=pages.token(), old="0000", pin="8402")[0] == 403
+        assert sessions.caller(other).name == "Ana", "a wrong PIN ends nobody's session"
+        assert pages.post("/people/own-pin", csrf=pages.token(), old="7391", pin="8402")[0] == 303
+        assert {sessions.caller(session).role for session in (other, own)} == {Role.VIEWER}
+        here = pages.cookies["station_session"]
+        assert sessions.caller(here).name == "Ana", "who has changed it stays logged in here"
+        log_in(pages)
+        assert pages.post("/people/put", csrf=pages.token(), name="Ana", role="quality", pin=OTHER_PIN)[0] == 303
+        assert sessions.caller(here).role is Role.VIEWER
+
+    def test_an_administrator_that_makes_himself_operator_is_one_everywhere(self, pages):
+        pages.context.people.begin("admin", PIN)
+        pages.context.people.put("Bea", Role.ADMIN, OTHER_PIN)
+        elsewhere = pages.context.sessions.log_in("Bea", Role.ADMIN)
+        log_in(pages, "Bea", Role.ADMIN)
+        assert pages.post("/people/put", csrf=pages.token(), name="Bea", role="operator", pin="7391")[0] == 303
+        assert pages.post("/people/put", csrf=pages.token(), name="Eve", role="admin", pin=PIN)[0] == 403
+        assert pages.context.sessions.caller(pages.cookies["station_session"]).role is Role.OPERATOR
+        assert pages.context.sessions.caller(elsewhere).role is Role.VIEWER
+
+    def test_audit_rows_of_anybody_are_limited_and_those_left_out_are_counted(self, pages, monkeypatch):
+        noted = []
+
+        async def request(_, what, *__, **___):
+            noted.append(what)
+
+        monkeypatch.setattr(Gateway, "request", request)
+        for _ in range(UNNAMED_BURST + 20):
+            assert pages.post("/people/clean", csrf=pages.token())[0] == 204
+        assert len(noted) == UNNAMED_BURST
+        log_in(pages)
+        assert pages.post("/people/clean", csrf=pages.token())[0] == 204
+        assert noted[-1].person.who == "admin", "a person's are not"
+        pages.cookies.clear()
+        later_s = time.monotonic() + UNNAMED_REFILL_S + 1
+        monkeypatch.setattr("hmi.web.gateway.time.monotonic", lambda: later_s)
+        assert pages.post("/people/clean", csrf=pages.token())[0] == 204
+        assert "20 rows before it left out" in noted[-1].subject
+        assert pages.post("/people/clean", csrf=pages.token())[0] == 204
+        assert len(noted) == UNNAMED_BURST + 2
+
     def test_names_from_outside_are_shown_as_text(self, pages):
         name = "<img src=x onerror=alert(1)>"
         pages.context.people.begin(name, PIN)
@@ -248,21 +304,55 @@ class TestPinLimit:
         limit = LoginRateLimiter(clock)
         waits = []
         for _ in range(40):
-            limit.tried("name")
-            waits.append(limit.wait_s("name", "address"))
+            limit.tried("name", "10.0.0.1")
+            waits.append(limit.wait_s("name", "10.0.0.2"))
             clock.now_s += waits[-1]
         assert waits[:FREE_TRIES] == [0.0] * FREE_TRIES
         assert waits == sorted(waits)
         assert waits[-1] == LONGEST_WAIT_S
-        limit.right("name")
-        assert limit.wait_s("name") == 0.0
+        limit.right("name", "10.0.0.1")
+        assert limit.wait_s("name", "10.0.0.3") == 0.0
 
     def test_an_address_that_tries_many_names_waits_too(self):
         limit = LoginRateLimiter(Clock())
         for number in range(FREE_TRIES + 1):
-            limit.tried(f"name {number}", "address")
-        assert limit.wait_s("name 99", "address") > 0
-        assert limit.wait_s("name 1", "another address") == 0.0
+            limit.tried(f"name {number}", "10.0.0.1")
+        assert limit.wait_s("name 99", "10.0.0.1") > 0
+        assert limit.wait_s("name 1", "10.0.0.2") == 0.0
+
+
+class TestWrongPins:
+    def log_in(self, pages, address, pin="7391", name="Ana"):
+        pages.cookies.clear()
+        pages.asked_from = address
+        return pages.post("/people/log-in", csrf=pages.token(), name=name, pin=pin)[0]
+
+    @pytest.fixture
+    def ana(self, pages):
+        pages.context.people.begin("admin", PIN)
+        pages.context.people.put("Ana", Role.OPERATOR, "7391")
+        return pages
+
+    def test_from_elsewhere_they_slow_the_person_but_not_at_her_own_panel_or_the_stations_screen(self, ana):
+        assert self.log_in(ana, "10.0.0.1") == 303
+        tried = [self.log_in(ana, f"10.0.9.{number}", "0000") for number in range(FREE_TRIES + 3)]
+        assert tried == [403] * (FREE_TRIES + 1) + [429] * 2
+        assert self.log_in(ana, "10.0.0.2") == 429, "who comes from an address that is not known waits"
+        assert self.log_in(ana, "10.0.0.1") == 303
+        assert self.log_in(ana, "127.0.0.1") == 303
+
+    @pytest.mark.parametrize("address", ["10.0.0.1", "127.0.0.1", "10.0.0.9"])
+    def test_each_address_is_slowed_itself(self, ana, address):
+        if address != "10.0.0.9":
+            assert self.log_in(ana, address) == 303
+        tried = [self.log_in(ana, address, "0000") for _ in range(FREE_TRIES + 3)]
+        assert tried == [403] * (FREE_TRIES + 1) + [429] * 2
+
+    def test_a_known_panel_is_slowed_for_the_names_that_it_does_not_know(self, ana):
+        assert self.log_in(ana, "10.0.0.1") == 303
+        tried = [self.log_in(ana, "10.0.0.1", "000000", "admin") for _ in range(FREE_TRIES + 2)]
+        assert tried[-1] == 429
+        assert self.log_in(ana, "10.0.0.1") == 303
 
 
 class TestPeopleFile:

@@ -6,39 +6,8 @@ import ssl
 import subprocess
 import sys
 import urllib.request
-from datetime import UTC, datetime, timedelta
-from ipaddress import IPv4Address
 
 import pytest
-from cryptography import x509
-from cryptography.hazmat.primitives import hashes, serialization
-from cryptography.hazmat.primitives.asymmetric import ec
-
-
-@pytest.fixture
-def certificate(tmp_path):
-    """Signed by itself, for 127.0.0.1; gives the settings that name it."""
-    key = ec.generate_private_key(ec.SECP256R1())
-    name, now = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "station")]), datetime.now(UTC)
-    made = (
-        x509.CertificateBuilder()
-        .subject_name(name)
-        .issuer_name(name)
-        .public_key(key.public_key())
-        .serial_number(x509.random_serial_number())
-        .not_valid_before(now - timedelta(days=1))
-        .not_valid_after(now + timedelta(days=1))
-        .add_extension(x509.SubjectAlternativeName([x509.IPAddress(IPv4Address("127.0.0.1"))]), critical=False)
-        .sign(key, hashes.SHA256())
-    )
-    pem, plain = serialization.Encoding.PEM, serialization.NoEncryption()
-    (tmp_path / "station.crt").write_bytes(made.public_bytes(pem))
-    (tmp_path / "station.key").write_bytes(key.private_bytes(pem, serialization.PrivateFormat.PKCS8, plain))
-    return {
-        "STATION_HMI_TLS_ENABLED": "true",
-        "STATION_HMI_TLS_CERTIFICATE": str(tmp_path / "station.crt"),
-        "STATION_HMI_TLS_KEY": str(tmp_path / "station.key"),
-    }
 
 
 @pytest.mark.timeout(240)

@@ -73,4 +73,5 @@ PROVOCATIONS: dict[AlarmId, tuple[Provocation, ...]] = {
     AlarmId.CALIBRATION_OLD: (Provocation("camera", "gel_worn"),),
     AlarmId.HMI_LOST: (Provocation("process", "hmi"),),
     AlarmId.OUTBOX_BEHIND: (Provocation("process", "postgresql_away"),),
+    AlarmId.CONNECTION_FLOOD: (Provocation("process", "connections"),),
 }

@@ -16,7 +16,6 @@ from typing import Any
 
 import pytest
 import structlog
-import uvicorn
 from click.testing import CliRunner
 
 from hmi.api.tokens import ApiTokens
@@ -32,6 +31,7 @@ from station.messages import commands, recipes, records, settings
 from station.messages.message import VERBATIM, Message, definitions
 from station.messages.reasons import reason_message
 from station.settings.configuration import Configuration
+from station.supervision.guard import Limits
 from station.supervision.serving import Server, listen
 from station.vocabulary import Reason, Refusal
 
@@ -87,9 +87,9 @@ class Pages:
 async def served(site: Configuration) -> AsyncIterator[Pages]:
     """Serve the pages of a station."""
     token = ApiTokens(site.home / "hmi").add("test", Role.VIEWER)
-    listener = listen("127.0.0.1", 0, "hmi", "the pages")
-    server = Server(uvicorn.Config(make_app(make_context(site)), log_config=None, access_log=False, ws="none"))
-    serving = asyncio.create_task(server.serve(sockets=[listener]), name="pages")
+    listener = listen("127.0.0.1", 0, "hmi", "the pages", Limits(most=100, per_address=100, reserve=100))
+    server = Server(listener, make_app(make_context(site)))
+    serving = asyncio.create_task(server.run_until_exit(), name="pages")
     try:
         yield Pages(f"http://127.0.0.1:{listener.getsockname()[1]}", token)
     finally:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
@@ -14,9 +13,12 @@ from starlette.routing import Route
 
 from station.messages.message import Message
 from station.runtime.observability.metrics import Metrics
-from station.supervision.serving import CLOSE_S, AddressError, Server, listen
+from station.supervision.guard import GuardedListener, Limits
+from station.supervision.serving import AddressError, Server, listen
 
 START_S = 5.0
+LIMITS = Limits(most=64, per_address=32, reserve=32)
+"""Known is this machine alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +111,7 @@ class HealthServer:
         self._liveness = liveness
         self._readiness = readiness
         self._version = dict(version)
+        self._listener: GuardedListener | None = None
         self._server: Server | None = None
         self._task: asyncio.Task[None] | None = None
 
@@ -118,26 +121,16 @@ class HealthServer:
         Raises:
             AddressError: the port is in use, or the address is not this machine's.
         """
-        listener = listen(self._host, self._port, "metrics", "metrics and health")
+        listener = listen(self._host, self._port, "metrics", "metrics and health", LIMITS)
         routes = [
             Route("/metrics", self._metrics_page),
             Route("/livez", self._livez),
             Route("/readyz", self._readyz),
             Route("/version", self._version_page),
         ]
-        config = uvicorn.Config(
-            Starlette(routes=routes),
-            lifespan="off",
-            log_config=None,
-            access_log=False,
-            ws="none",
-            server_header=False,
-            limit_concurrency=64,
-            timeout_keep_alive=30,
-            timeout_graceful_shutdown=CLOSE_S,  # type: ignore[arg-type]
-        )
-        self._server = Server(config)
-        self._task = asyncio.create_task(self._server.serve(sockets=[listener]), name="health")
+        self._server = Server(listener, Starlette(routes=routes), lifespan="off")
+        self._task = asyncio.create_task(self._server.run_until_exit(), name="health")
+        self._listener = listener
         async with asyncio.timeout(START_S):
             while not self._server.started:
                 if self._task.done():
@@ -145,6 +138,11 @@ class HealthServer:
                     raise AddressError(f"the health server on {self._host}:{self._port} ended at once; see the log")
                 await asyncio.sleep(0.005)
         return listener.getsockname()[1]
+
+    @property
+    def flooded_by(self) -> str:
+        """The address that floods this server with connections; empty for none."""
+        return "" if self._listener is None else self._listener.flooded_by
 
     async def close(self) -> None:
         """Answer what is under way, for at most a second, and stop. Idempotent."""

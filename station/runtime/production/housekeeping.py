@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from station.devices.gripper.errors import GripperFaultError, GripperNotActiveError
 from station.errors import StationError
@@ -37,8 +37,7 @@ class Housekeeping:
         configuration: free disk space below which nothing is inspected, and the longest pause between two attempts.
         production: what is recovered and watched; its recipes are read again, because people edit and approve them.
         observability: gets this task's progress and findings.
-        hmi_fault: returns the fault of the HMI's process; None for none.
-        outbox: returns the outbox's delay, None for none.
+        conditions: of alarms whose cause others watch; each returns the alarm's detail, None where it is not active.
         broken: error of the configuration at the start; None for none.
     """
 
@@ -47,14 +46,13 @@ class Housekeeping:
         configuration: Configuration,
         production: Production,
         observability: Observability,
-        hmi_fault: Callable[[], Message | None],
-        outbox: Callable[[], Message | None],
+        conditions: Mapping[AlarmId, Callable[[], Message | None]],
         broken: Message | None,
     ) -> None:
         self._service, self._devices, self._interlock = production.service, production.devices, production.interlock
         self._plc_commands, self._recipes = production.plc_commands, production.recipes
         self._metrics, self._liveness, self._audit = observability.metrics, observability.liveness, observability.audit
-        self._hmi_fault, self._outbox, self._broken = hmi_fault, outbox, broken
+        self._conditions, self._broken = conditions, broken
         self._book_at_s = time.monotonic()
         self._reserve_mb = configuration.records.free_reserve_mb
         self._longest_pause_s = configuration.service.retry_longest_s
@@ -141,8 +139,8 @@ class Housekeeping:
         alarms.update(AlarmId.RECIPE_BROKEN, joined(problems) if problems else None)
         alarms.update(AlarmId.NO_RECIPE, messages.NEVER_CHOSEN() if self._recipe_missing() else None)
         alarms.update(AlarmId.CALIBRATION_OLD, self._devices.calibration.alarm_detail())
-        alarms.update(AlarmId.HMI_LOST, self._hmi_fault())
-        alarms.update(AlarmId.OUTBOX_BEHIND, self._outbox())
+        for alarm, detail in self._conditions.items():
+            alarms.update(alarm, detail())
         self._plc_commands.update_line_alarms()
         self._count_restarts()
         self._check_clock()

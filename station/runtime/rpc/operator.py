@@ -76,6 +76,8 @@ class PanelServer:
         )
         self._inspections = RecentInspections()
         self._heard_s: float | None = None
+        self.flooded_by = ""
+        """The address that floods the pages, as their process said last; empty for none."""
         self._service.registry.listen(self._inspections.add)
         self._service.listen(self._inspections.set_outcome)
         self.handlers: Handlers = {
@@ -112,8 +114,8 @@ class PanelServer:
         age_s = 0.0 if self._heard_s is None else time.monotonic() - self._heard_s
         return messages.PAGES_SILENT(age_s=age_s) if age_s > SILENT_S else None
 
-    async def _state(self, _request: GetPanelState) -> PanelState:
-        self._heard_s = time.monotonic()
+    async def _state(self, request: GetPanelState) -> PanelState:
+        self._heard_s, self.flooded_by = time.monotonic(), request.flooded_by
         service, line = self._service, self._interlock.state()
         facts, active = STATES[service.state], service.active
         report = self._plc_commands.last_report

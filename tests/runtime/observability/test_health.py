@@ -205,3 +205,22 @@ def test_many_ask_at_once_and_no_thread_serves_them(server, scenario):
         await health.close()
 
     scenario(steps)
+
+
+@pytest.mark.parametrize("sent", [b"", b"GET /readyz HTTP/1.1\r\nHost: x\r\n"])
+def test_silent_and_half_asking_clients_close_the_door_to_nobody(server, scenario, sent):
+    async def steps():
+        health = server()
+        port = await health.start()
+        crowd = []
+        for _ in range(250):
+            crowd.append(await asyncio.open_connection("127.0.0.1", port, local_addr=("127.0.0.9", 0)))
+            crowd[-1][1].write(sent)
+        assert (await asyncio.to_thread(get, port, "/readyz"))[0] == 503
+        assert (await asyncio.to_thread(get, port, "/metrics"))[0] == 200
+        assert health.flooded_by == "127.0.0.9"
+        for _, writer in crowd:
+            writer.close()
+        await health.close()
+
+    scenario(steps)

@@ -1,0 +1,31 @@
+"""Places of the event streams: for one address or person so many; a new page takes the place of the oldest."""
+
+import time
+
+from station.supervision.places import Places
+
+MOST_STREAMS, RESERVED_STREAMS = 100, 100
+"""Of all strangers together; of people who are logged in, and of known addresses."""
+
+
+class Stream:
+    """One page's event stream.
+
+    Args:
+        holder: the person, or the address where nobody is logged in.
+        known: whether it uses the reserve.
+    """
+
+    def __init__(self, holder: str, *, known: bool) -> None:
+        self.holder, self.known = holder, known
+        self.rank: tuple[float, ...] | None = (time.monotonic(),)
+        self.displaced = False
+
+    def displace(self) -> None:
+        """End: another page has the place."""
+        self.displaced = True
+
+
+def stream_places(pages_per_address: int) -> Places[Stream]:
+    """Make the places of all pages' streams."""
+    return Places(MOST_STREAMS, pages_per_address, RESERVED_STREAMS)

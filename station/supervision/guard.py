@@ -1,0 +1,181 @@
+"""Connection guard of our HTTP servers: limits, and time limits, of connections, below TLS and HTTP."""
+
+import asyncio
+import contextlib
+import logging
+import socket
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from starlette.datastructures import Headers
+from starlette.responses import PlainTextResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from station.supervision.places import Places
+
+FIRST_REQUEST_S = 10.0
+"""From the connection's begin, TLS handshake included, to the end of its first request, body included."""
+KEEP_ALIVE_S = 30
+"""From a response to the next request."""
+NEXT_REQUEST_S = KEEP_ALIVE_S + 5.0
+"""Likewise, to that request's end."""
+STALLED_S = 10.0
+"""A client that does not take its response for so long is disconnected."""
+MOST_AT_ONCE = 128
+"""Connections taken from the kernel, or closed, before those that exist have their turn."""
+
+log = logging.getLogger(__name__)
+
+
+class Limits(NamedTuple):
+    """Numbers of connections."""
+
+    most: int
+    """Of all strangers together."""
+    per_address: int
+    reserve: int
+    """Of all known addresses together."""
+
+
+def is_loopback(address: str) -> bool:
+    """Return whether an address is this machine's own."""
+    plain = address.removeprefix("::ffff:")
+    return plain.startswith("127.") or plain == "::1"
+
+
+class GuardedConnection(socket.socket):
+    """One client's connection. It has its place until it is closed and its last request is answered."""
+
+    def __init__(self, accepted: socket.socket, client: tuple[str, int], places: Places["GuardedConnection"]) -> None:
+        super().__init__(accepted.family, accepted.type, accepted.proto, accepted.detach())
+        self._places = places
+        self.client = client
+        self.holder, self.known = client[0], False
+        self.since_s = time.monotonic()
+        """When it began, or its last response ended."""
+        self.has_asked = self.is_asking = self._is_closed = False
+
+    @property
+    def rank(self) -> tuple[float, ...] | None:
+        """One that never made a request is the first to give way, one with a request under way does not."""
+        return None if self.is_asking else (self.has_asked, self.since_s)
+
+    @property
+    def overdue(self) -> bool:
+        """Whether the next request should be there by now."""
+        limit_s = NEXT_REQUEST_S if self.has_asked else FIRST_REQUEST_S
+        return not self.is_asking and time.monotonic() - self.since_s > limit_s
+
+    def displace(self) -> None:
+        """End the connection: the event loop that reads it finds its end, and closes it."""
+        with contextlib.suppress(OSError):
+            self.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        """Close it, and free its place."""
+        super().close()
+        self._is_closed = True
+        self._leave()
+
+    def begin(self) -> None:
+        """Note that a whole request has come."""
+        self.has_asked = self.is_asking = True
+
+    def end(self) -> None:
+        """Note that a request is answered."""
+        self.is_asking, self.since_s = False, time.monotonic()
+        self._leave()
+
+    def _leave(self) -> None:
+        if self._is_closed and not self.is_asking:
+            self._places.leave(self)
+
+
+class GuardedListener(socket.socket):
+    """Listening socket that admits connections within limits; what it hands out has a place.
+
+    Args:
+        family: of `socket`.
+        limits: numbers of connections.
+        known: returns whether an address may use the reserve.
+    """
+
+    def __init__(self, family: int, limits: Limits, known: Callable[[str], bool]) -> None:
+        super().__init__(family, socket.SOCK_STREAM)
+        self._known = known
+        self._places: Places[GuardedConnection] = Places(limits.most, limits.per_address, limits.reserve)
+        self._flood = ""
+
+    @property
+    def flooded_by(self) -> str:
+        """The address that floods this listener; empty for none."""
+        return self._places.flooded_by
+
+    def accept(self) -> tuple[socket.socket, Any]:
+        """Return the next connection that has got a place; others are closed.
+
+        Raises:
+            BlockingIOError: there is none, or others have to have their turn.
+        """
+        for _ in range(MOST_AT_ONCE):
+            accepted, peer = super().accept()
+            connection = GuardedConnection(accepted, (peer[0], peer[1]), self._places)
+            connection.known = self._known(connection.holder)
+            if self._places.enter(connection):
+                return connection, peer
+            connection.close()
+        raise BlockingIOError
+
+    def sweep(self) -> None:
+        """Disconnect clients whose request does not come; to be called every now and then."""
+        for connection in self._places:
+            if connection.overdue:
+                self._places.leave(connection)
+                connection.displace()
+        if self.flooded_by != self._flood:
+            self._flood = self.flooded_by
+            text = f"connections of {self._flood} are turned away" if self._flood else "no connections are turned away"
+            log.warning("port %d: %s", self.getsockname()[1], text)
+
+    def guarded(self, app: ASGIApp) -> ASGIApp:
+        """Return an application that reports its requests here. It disconnects clients that do not take a response."""
+
+        async def serve(scope: Scope, receive: Receive, send: Send) -> None:
+            if scope["type"] != "http":
+                await app(scope, receive, send)
+                return
+            client = tuple(scope["client"] or ())
+            connection = next((each for each in self._places if each.client == client), None)
+            if connection is None:  # displaced, or overdue, while its request came
+                await PlainTextResponse("too many connections", 503, {"connection": "close"})(scope, receive, send)
+                return
+
+            connection.known = self._known(connection.holder)
+            if not _has_body(scope):
+                connection.begin()
+
+            async def receive_to_end() -> Message:
+                message = await receive()
+                if not message.get("more_body"):
+                    connection.begin()
+                return message
+
+            async def send_in_time(message: Message) -> None:
+                try:
+                    async with asyncio.timeout(STALLED_S):
+                        await send(message)
+                except TimeoutError:
+                    connection.displace()
+
+            try:
+                await app(scope, receive_to_end, send_in_time)
+            finally:
+                connection.end()
+
+        return serve
+
+
+def _has_body(scope: Scope) -> bool:
+    headers = Headers(scope=scope)
+    return "transfer-encoding" in headers or headers.get("content-length", "0") != "0"

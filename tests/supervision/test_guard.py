@@ -1,0 +1,195 @@
+"""The guard of our HTTP servers, asked over sockets, with short time limits."""
+
+import asyncio
+import contextlib
+import socket
+from pathlib import Path
+
+import pytest
+from starlette.applications import Starlette
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route
+
+from station.supervision.guard import Limits, is_loopback
+from station.supervision.serving import Server, listen
+
+ASK = b"GET / HTTP/1.1\r\nhost: here\r\n\r\n"
+LARGE = b"GET /large HTTP/1.1\r\nhost: here\r\n\r\n"
+LONG = b"GET /long HTTP/1.1\r\nhost: here\r\n\r\n"
+LIMITS = Limits(most=8, per_address=4, reserve=4)
+STRANGER, ANOTHER, KNOWN = "127.0.0.9", "127.0.0.8", "127.0.0.1"
+
+
+@pytest.fixture(autouse=True)
+def short_limits(monkeypatch):
+    monkeypatch.setattr("station.supervision.guard.FIRST_REQUEST_S", 1.0)
+    monkeypatch.setattr("station.supervision.guard.NEXT_REQUEST_S", 2.0)
+    monkeypatch.setattr("station.supervision.guard.STALLED_S", 1.0)
+
+
+class Door:
+    def __init__(self, listener, under_way, stack):
+        self.listener, self.port = listener, listener.getsockname()[1]
+        self.under_way, self._stack = under_way, stack
+
+    async def come(self, source=STRANGER):
+        reader, writer = await asyncio.open_connection("127.0.0.1", self.port, local_addr=(source, 0))
+        self._stack.push_async_callback(self.leave, writer)
+        return reader, writer
+
+    @staticmethod
+    async def leave(writer):
+        writer.close()
+        with contextlib.suppress(OSError):
+            await writer.wait_closed()
+
+    async def ask(self, source=STRANGER, request=ASK):
+        """Whether a new connection's request is answered."""
+        reader, writer = await self.come(source)
+        writer.write(request)
+        return await answered(reader)
+
+
+async def answered(reader):
+    with contextlib.suppress(OSError):
+        async with asyncio.timeout(20):
+            return (await reader.readline()).startswith(b"HTTP/1.1 200")
+    return False
+
+
+async def ended(reader):
+    with contextlib.suppress(OSError):
+        async with asyncio.timeout(20):
+            return await reader.read() == b""
+    return True
+
+
+def files():
+    """How many files this process has open, the connections of clients and server among them."""
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+async def until(what):
+    async with asyncio.timeout(20):
+        while not what():
+            await asyncio.sleep(0.02)
+
+
+@pytest.fixture
+def door():
+    """Run a coroutine of a server's door in a loop of its own."""
+
+    def run(steps):
+        async def serve():
+            hold, under_way = asyncio.Event(), []
+
+            async def long(_):
+                under_way.append(1)
+                await hold.wait()
+                return Response()
+
+            routes = [
+                Route("/", lambda _: PlainTextResponse("here")),
+                Route("/large", lambda _: Response(bytes(50_000_000))),
+                Route("/long", long),
+            ]
+            listener = listen("127.0.0.1", 0, "hmi", "the pages", LIMITS, lambda address: address == KNOWN)
+            server = Server(listener, Starlette(routes=routes), lifespan="off")
+            serving = asyncio.create_task(server.run_until_exit())
+            await until(lambda: server.started)
+            async with contextlib.AsyncExitStack() as stack:
+                await steps(Door(listener, under_way, stack))
+                hold.set()
+            server.should_exit = True
+            await serving
+
+        asyncio.run(serve())
+
+    return run
+
+
+def test_silent_connections_make_room_and_end(door):
+    async def steps(door):
+        silent = [(await door.come())[0] for _ in range(60)]
+        assert await door.ask(), "from the same address"
+        assert await door.ask(ANOTHER)
+        assert door.listener.flooded_by == STRANGER
+        assert all([await ended(reader) for reader in silent])
+
+    door(steps)
+
+
+def test_half_a_header_ends_in_time_and_a_drip_does_not_prolong_it(door):
+    async def steps(door):
+        reader, writer = await door.come()
+        for letter in ASK[:-1].decode() * 3:
+            with contextlib.suppress(OSError):
+                writer.write(letter.encode())
+                await asyncio.sleep(0.1)
+            if reader.at_eof():
+                break
+        assert await ended(reader)
+
+    door(steps)
+
+
+def test_after_an_answer_the_next_request_has_its_time_again(door):
+    async def steps(door):
+        reader, writer = await door.come()
+        writer.write(ASK)
+        assert await answered(reader)
+        await asyncio.sleep(1.3)  # more than the first request's time
+        writer.write(ASK)
+        async with asyncio.timeout(20):
+            assert b"HTTP/1.1 200" in await reader.readuntil(b"here") + await reader.readuntil(b"here")
+        writer.write(ASK[:10])
+        async with asyncio.timeout(20):
+            await reader.read()
+
+    door(steps)
+
+
+def test_a_client_that_does_not_take_its_response_ends(door):
+    async def steps(door):
+        before = files()
+        with socket.create_connection(("127.0.0.1", door.port)) as deaf:
+            deaf.sendall(LARGE)
+            await until(lambda: files() == before + 2)
+            await until(lambda: files() == before + 1)
+        assert await door.ask()
+
+    door(steps)
+
+
+def test_requests_under_way_do_not_give_way_and_leave_the_reserve_alone(door):
+    async def steps(door):
+        for source in (STRANGER, ANOTHER):
+            for _ in range(4):
+                (await door.come(source))[1].write(LONG)
+        await until(lambda: len(door.under_way) == 8)
+        assert not await door.ask("127.0.0.7")
+        assert await door.ask(KNOWN)
+
+    door(steps)
+
+
+def test_a_place_is_held_until_the_request_of_who_left_is_done(door):
+    async def steps(door):
+        for _ in range(4):
+            _, writer = await door.come()
+            writer.write(LONG)
+            before = len(door.under_way)
+            await until(lambda before=before: len(door.under_way) > before)
+            await door.leave(writer)
+        assert not await door.ask()
+        assert await door.ask(ANOTHER)
+
+    door(steps)
+
+
+@pytest.mark.parametrize(
+    ("address", "own"),
+    [("127.0.0.1", True), ("::1", True), ("::ffff:127.0.0.1", True), ("::12", False), ("10.0.0.1", False), ("", False)],
+)
+def test_loopback(address, own):
+    assert is_loopback(address) is own
