@@ -21,6 +21,10 @@ BEAT_S = 0.5
 """Period of a page's events if nothing changes."""
 
 
+AGAIN_MS = 1000
+"""A page whose stream has ended, as because another page has its place, asks again after this time."""
+
+
 class Part(NamedTuple):
     """A part of a page."""
 
@@ -102,6 +106,7 @@ class Live:
     async def _events(
         self, stream: Stream, names: tuple[str, ...], locale: Locale, caller: Callable[[], Caller]
     ) -> AsyncIterator[bytes]:
+        yield f"retry: {AGAIN_MS}\n\n".encode()
         sent: dict[str, str] = {}
         loop, beat_at_s = asyncio.get_running_loop(), 0.0
         while not self.ending and not stream.displaced:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from starlette.applications import Starlette
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from station.supervision.guard import Limits, is_loopback
@@ -15,6 +15,7 @@ from station.supervision.serving import Server, listen
 
 ASK = b"GET / HTTP/1.1\r\nhost: here\r\n\r\n"
 LARGE = b"GET /large HTTP/1.1\r\nhost: here\r\n\r\n"
+ENDLESS = b"GET /endless HTTP/1.1\r\nhost: here\r\n\r\n"
 LONG = b"GET /long HTTP/1.1\r\nhost: here\r\n\r\n"
 LIMITS = Limits(most=8, per_address=4, reserve=4)
 STRANGER, ANOTHER, KNOWN = "127.0.0.9", "127.0.0.8", "127.0.0.1"
@@ -58,7 +59,7 @@ async def answered(reader):
 
 
 async def ended(reader):
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(ConnectionError):
         async with asyncio.timeout(20):
             return await reader.read() == b""
     return True
@@ -88,7 +89,15 @@ def door():
                 await hold.wait()
                 return Response()
 
+            async def endless(_):
+                async def pieces():
+                    while True:
+                        yield bytes(1_000_000)
+
+                return StreamingResponse(pieces())
+
             routes = [
+                Route("/endless", endless),
                 Route("/", lambda _: PlainTextResponse("here")),
                 Route("/large", lambda _: Response(bytes(50_000_000))),
                 Route("/long", long),
@@ -149,11 +158,12 @@ def test_after_an_answer_the_next_request_has_its_time_again(door):
     door(steps)
 
 
-def test_a_client_that_does_not_take_its_response_ends(door):
+@pytest.mark.parametrize("request_", [LARGE, ENDLESS], ids=["in one piece", "in pieces"])
+def test_a_client_that_does_not_take_its_response_ends(door, request_):
     async def steps(door):
         before = files()
         with socket.create_connection(("127.0.0.1", door.port)) as deaf:
-            deaf.sendall(LARGE)
+            deaf.sendall(request_)
             await until(lambda: files() == before + 2)
             await until(lambda: files() == before + 1)
         assert await door.ask()
