@@ -132,7 +132,7 @@ def _draft(recipe: Recipe, best: Proposal, name: str, folder: Path | None) -> tu
     }
     changes[f"damage.area[{chosen}].area_mm2"] = limit
     changes[f"damage.area[{chosen}].closing_mm"] = best.closing_mm
-    if chosen and recipe.damage.decided_by != "every_limit":
+    if chosen and recipe.damage.decided_by == "first_trusted":
         changes["damage.decided_by"] = "every_limit"  # what is proposed decides on every fruit
     if recipe.damage.size is not None:
         changes["damage.size.exponent"] = best.exponent

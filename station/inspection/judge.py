@@ -169,11 +169,18 @@ def early_stop(press: Press, recipe: Recipe) -> Stop | None:
 
 
 def _case(press: Press, recipe: Recipe) -> "_Case":
-    """The press beside the limits that decide on it: all of them, or the first by itself whose area is trusted."""
+    """The press beside the limits that decide on it: all of them, or by itself the one that does."""
     if recipe.damage.decided_by == "every_limit":
         return _Case(press, recipe)
     cases = [_Case(press, _with_limit(recipe, limit)) for limit in recipe.damage.area]
-    return next((case for case in cases if case.decides), cases[-1])
+    decided, last = [case for case in cases if case.decides], cases[-1]
+    if not decided:
+        return last
+    if recipe.damage.decided_by == "first_trusted":
+        return decided[0]
+    # Every trusted one: the first that is not kept. An area that is not trusted at the last is still a lower bound.
+    not_kept = next((case for case in decided if case.findings), None)
+    return not_kept or (decided[-1] if last.reached and not last.near else last)
 
 
 def _with_limit(recipe: Recipe, limit: AreaThreshold) -> Recipe:
@@ -199,12 +206,21 @@ class _Case:
         return [*damage, *_distrust(self.evidence, self.limits.recipe)]
 
     @property
+    def reached(self) -> bool:
+        """Whether the last limit's closing was reached."""
+        return self.evidence.area_at(self.limits.recipe.damage.area[-1].closing_mm) is not None
+
+    @property
+    def near(self) -> bool:
+        """Whether a limit may be passed, by whatever was measured."""
+        return any(finding.reason is Reason.NEAR_LIMIT for finding in self.findings)
+
+    @property
     def decides(self) -> bool:
         """Whether damage is proven, or the last limit was reached and nothing is in doubt but how near it is."""
         if self.void or any(finding.proves for finding in self.findings):
             return True
-        reached = self.evidence.area_at(self.limits.recipe.damage.area[-1].closing_mm) is not None
-        return reached and all(finding.reason is Reason.NEAR_LIMIT for finding in self.findings)
+        return self.reached and all(finding.reason is Reason.NEAR_LIMIT for finding in self.findings)
 
     @cached_property
     def stopped(self) -> Stop | None:

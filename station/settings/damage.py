@@ -235,13 +235,13 @@ class DamageThresholds(Settings):
         max_length=20,
     )
     # Left out of a recipe's values where every limit decides, as in recipes written before it.
-    decided_by: Annotated[Literal["every_limit", "first_trusted"], Field(exclude_if=lambda by: by == "every_limit")] = (
-        setting(
-            default="every_limit",
-            title="Decided by",
-            description="`every_limit` asks each area threshold. `first_trusted` takes the first whose area is "
-            "trusted; later ones are for fruit whose area is not.",
-        )
+    decided_by: Annotated[
+        Literal["every_limit", "first_trusted", "every_trusted"], Field(exclude_if=lambda by: by == "every_limit")
+    ] = setting(
+        default="every_limit",
+        title="Decided by",
+        description="`every_limit` checks each area threshold. `every_trusted` checks each whose area is trusted, and "
+        "needs one. `first_trusted` takes the first whose area is trusted; later ones are for fruit whose area is not.",
     )
     growth_mm2_per_mm: float = setting(
         title="Growth threshold",
@@ -264,8 +264,8 @@ class DamageThresholds(Settings):
 
     @property
     def deciding_closing_mm(self) -> float:
-        """The closing of the limit that decides on a fruit whose areas are trusted, mm."""
-        return self.area[0 if self.decided_by == "first_trusted" else -1].closing_mm
+        """The closing of the first limit that decides by itself on a fruit whose areas are trusted, mm."""
+        return self.area[-1 if self.decided_by == "every_limit" else 0].closing_mm
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

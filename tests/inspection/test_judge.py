@@ -560,9 +560,46 @@ def test_the_first_limit_whose_area_is_trusted_decides(growth, doubtful_mm, flag
     assert (verdict.outcome, press.points[-1].closing_mm) == (outcome, last_mm), verdict.findings
 
 
+EVERY_TRUSTED = FIRST_TRUSTED.model_copy(
+    update={"damage": FIRST_TRUSTED.damage.model_copy(update={"decided_by": "every_trusted"})}
+)
+
+
+def every_trusted(at_2_mm2: float, at_4_mm2: float, doubtful_mm: tuple[float, ...], flag: Flag) -> Press:
+    """A strawberry pressed by the same limits, each of which has to be kept where its area is trusted."""
+    press = Press(35.0, 0.4, ())
+    areas_mm2 = (0.0, at_2_mm2 / 2, at_2_mm2, (at_2_mm2 + at_4_mm2) / 2, at_4_mm2, 1.25 * at_4_mm2)
+    for closing, area_mm2 in enumerate(areas_mm2):
+        flags = (flag,) if closing in doubtful_mm else ()
+        press = replace(press, points=(*press.points, point(float(closing), area_mm2, *flags)))
+        if early_stop(press, EVERY_TRUSTED):
+            return press
+    return press
+
+
+@pytest.mark.parametrize(
+    ("at_2_mm2", "at_4_mm2", "doubtful_mm", "flag", "outcome", "last_mm"),
+    [
+        (30, 60, (), Flag.LOW_CONFIDENCE, "PASS", 4),
+        (30, 98, (), Flag.LOW_CONFIDENCE, "NO_RESULT", 4),
+        (40, 121, (), Flag.LOW_CONFIDENCE, "FAIL", 4),
+        (49, 60, (), Flag.LOW_CONFIDENCE, "NO_RESULT", 2),
+        (70, 80, (), Flag.LOW_CONFIDENCE, "FAIL", 2),
+        (30, 60, (2,), Flag.LOW_CONFIDENCE, "PASS", 4),
+        (30, 60, (4,), Flag.CUT_BY_BORDER, "PASS", 4),
+        (30, 98, (4,), Flag.CUT_BY_BORDER, "NO_RESULT", 4),
+        (30, 60, (2, 4), Flag.CUT_BY_BORDER, "NO_RESULT", 4),
+    ],
+)
+def test_every_limit_whose_area_is_trusted_has_to_be_kept(at_2_mm2, at_4_mm2, doubtful_mm, flag, outcome, last_mm):
+    press = every_trusted(at_2_mm2, at_4_mm2, doubtful_mm, flag)
+    verdict = judge(press, EVERY_TRUSTED)
+    assert (verdict.outcome, press.points[-1].closing_mm) == (outcome, last_mm), verdict.findings
+
+
 def test_a_recipe_says_when_not_every_limit_decides():
     assert "decided_by" not in DECIDING.model_dump(mode="json")["damage"], "older recipes keep their content hash"
-    assert (DECIDING.damage.deciding_closing_mm, FIRST_TRUSTED.damage.deciding_closing_mm) == (4, 2)
+    assert [recipe.damage.deciding_closing_mm for recipe in (DECIDING, FIRST_TRUSTED, EVERY_TRUSTED)] == [4, 2, 2]
     both = FIRST_TRUSTED.model_copy(
         update={"damage": FIRST_TRUSTED.damage.model_copy(update={"decided_by": "every_limit"})}
     )
