@@ -3,7 +3,7 @@
 Run with `./run bench sorting`. Closings are imaged once and kept below `state/sorting`, by a hash of the code that
 draws and measures them; judging them by another recipe then takes seconds. `--count 300` images about 1,800 closings of
 each kind, 75 minutes on two cores, and can be interrupted and resumed. Writes the tables of `docs/sorting.md`, and the
-first one into `README.md`; `--seeds tuning` and a part of the kinds print them only: what is tuned on must not be
+first one into `README.md`; other seeds and a part of the kinds print them only: what is tuned on must not be
 published as the result.
 """
 
