@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -180,6 +181,36 @@ def test_a_limit_is_proposed_from_marked_fruit_and_written_as_a_draft(orchard, d
         assert station("records", "mark", *some, word)[0] == 0
     assert station(*again)[0] == 0
     assert json.loads((tmp_path / "again" / "thresholds.json").read_text()) == figures, "as from the table"
+
+
+@pytest.mark.parametrize(
+    ("decided_by", "drafted"), [("every_trusted", "every_trusted"), ("first_trusted", "every_limit")]
+)
+def test_the_proposed_limit_decides_on_every_fruit(
+    orchard, station, changed, tmp_path, monkeypatch, decided_by, drafted
+):
+    recipe = changed(find_recipe("strawberry"), damage__decided_by=decided_by)
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "strawberry.yaml").write_text(recipe.model_dump_json())
+    monkeypatch.setenv("STATION_RECIPES_FOLDER", str(tmp_path / "site"))
+
+    def at_3_mm(number: int, area_mm2: float) -> Press:
+        """Until then good and bad fruit are alike."""
+        areas_mm2 = (4.0, 28.0, 50.0 + number % 10, area_mm2)
+        points = (Measured(float(step), each, round(each * 1100), 0.9) for step, each in enumerate(areas_mm2))
+        return Press(35.0, 0.4, tuple(points))
+
+    good = [at_3_mm(number, 80.0 + number % 7) for number in range(30)]
+    bad = [at_3_mm(number, 104.0 + number % 3) for number in range(10)]
+    made = replace(orchard, recipe=recipe).store([*good, *bad])
+    for word, some in (("good", made[:30]), ("bad", made[30:])):
+        assert station("records", "mark", *some, word)[0] == 0
+    file = tmp_path / "proposed.yaml"
+    code, told = station("thresholds", "--recipe", "strawberry", "--out", tmp_path / "out", "--draft", file)
+    assert (code, "mm² at 3 mm" in told) == (0, True), told
+    damage = load_recipe(file).damage
+    assert (damage.decided_by, len(damage.area)) == (drafted, 2)
+    assert damage.area[1].area_mm2 < 130
 
 
 @pytest.mark.parametrize(
