@@ -169,6 +169,7 @@ async def inspection(request: Request, hmi: HmiNow, locale: LocaleNow, sequence:
         "inspection.html.j2",
         reply=reply,
         reasons=[(code, reason_message(code)) for code in reply.reasons],
+        limit=_deciding_limit(reply),
         chart=_chart(reply, locale),
         steps=_steps(reply),
         reference=next((each for each in reply.images if each.kind == "reference" and each.there), None),
@@ -246,6 +247,28 @@ def _steps(reply: InspectionView) -> list[dict[str, Any]]:
     ]
 
 
+def _limits(reply: InspectionView) -> tuple[list[Limit], float | None]:
+    """Return the limits of the recipe at that time for this fruit's size, and its early stop; none if unknown."""
+    factor = float(reply.measures.get("limit_factor") or 1.0)
+    try:
+        recipe = reply.recipe or {}
+        limits = [
+            Limit(each["closing_mm"], factor * each["area_mm2"], factor * each.get("least_area_mm2", 0.0))
+            for each in recipe["damage"]["area"]
+        ]
+        return limits, factor * recipe["early_stop"]["area_mm2"]
+    except (KeyError, TypeError):  # of a form that this program does not know
+        return [], None
+
+
+def _deciding_limit(reply: InspectionView) -> Limit | None:
+    """Return the limit nearest to where the fruit was decided; None if there was no area."""
+    decided_mm = reply.standing.closing_mm if reply.standing is not None else None
+    if decided_mm is None:
+        return None
+    return min(_limits(reply)[0], key=lambda limit: abs(limit.closing_mm - decided_mm), default=None)
+
+
 def _chart(reply: InspectionView, locale: Locale) -> Markup | None:
     """Draw the curve with the limits of the recipe at that time."""
     points = [
@@ -255,16 +278,7 @@ def _chart(reply: InspectionView, locale: Locale) -> Markup | None:
     ]
     if reply.recipe is None:
         return None
-    limits, early = [], None
-    factor = float(reply.measures.get("limit_factor") or 1.0)  # for the fruit's size
-    try:
-        limits = [
-            Limit(each["closing_mm"], factor * each["area_mm2"], factor * each.get("least_area_mm2", 0.0))
-            for each in reply.recipe["damage"]["area"]
-        ]
-        early = factor * reply.recipe["early_stop"]["area_mm2"]
-    except (KeyError, TypeError):  # of a form that this program does not know
-        pass
+    limits, early = _limits(reply)
     label = locale.text("chart.fruit_label", n=reply.sequence)
     marks: list[Mark] = ["point"] * len(points)
     mark_decided(marks, points, reply.standing.closing_mm if reply.standing is not None else None)

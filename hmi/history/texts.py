@@ -91,6 +91,7 @@ define("audit.audit.continued", "The trail continues after rows that are missing
 
 define("inspection.title", "Fruit {n}")
 define("inspection.why", "Why")
+define("inspection.how", "How it was judged")
 define("inspection.nothing_wrong", "All values were within the recipe's limits.")
 define("inspection.area", "Contact area")
 define("inspection.changed_area", "Changed area")

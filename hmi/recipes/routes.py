@@ -1,5 +1,6 @@
 """Recipes page: state, editing as drafts with every limit drawn on past curves, approval by another person."""
 
+import re
 from collections.abc import Mapping
 from typing import Annotated, Any
 
@@ -8,7 +9,7 @@ from pydantic import StringConstraints
 from starlette.responses import Response
 
 from hmi.common.charts import area_over_closing
-from hmi.recipes.form import BadFieldError, Group, changed, formatted, groups, with_changes
+from hmi.recipes.form import BadFieldError, changed, formatted, groups, with_changes
 from hmi.recipes.strip import strip
 from hmi.web.access import HmiNow, LocaleNow, caller_of, orders
 from hmi.web.context import Hmi
@@ -52,6 +53,8 @@ from station.messages.message import Message
 router = APIRouter(prefix="/recipes")
 ENTRY = Entry("recipes", "/recipes")
 DEADLINE_S = 20.0
+_OFTEN = re.compile(r"damage\.area\[\d+\]|damage|early_stop|expected_width")
+"""Groups of values that are changed often; the others are folded."""
 _PREFIX = "v:"
 """Of a form's fields that are values of the recipe."""
 
@@ -244,7 +247,8 @@ async def _form(
         "recipe_edit.html.j2",
         status=400 if wrong else 200,
         row=reply.row,
-        groups=_sorted(made),
+        often=[each for each in made if _OFTEN.fullmatch(each.path)],
+        rare=[each for each in made if not _OFTEN.fullmatch(each.path)],
         texts=texts,
         prefix=_PREFIX,
         wrong=wrong,
@@ -255,13 +259,6 @@ async def _form(
         editable=known.editable and caller.may(Right.EDIT_RECIPES),
         tab="edit",
     )
-
-
-def _sorted(made: list[Group]) -> list[tuple[Group, bool]]:
-    """Sort the groups: frequently changed ones first and open; the others follow, folded."""
-    often = ("damage", "early_stop", "expected_width", "steps")
-    order = [each for start in often for each in made if each.path.startswith(start)]
-    return [*((each, True) for each in order), *((each, False) for each in made if each not in order)]
 
 
 def _title(locale: Locale, key: str, english: str) -> str:

@@ -19,7 +19,7 @@ class AreaThreshold(Settings):
     """The contact area above which a fruit is damaged, at one closing."""
 
     closing_mm: float = setting(
-        title="Closing", description="One of the results' closings.", unit="mm", gt=0.0, le=50.0
+        title="Closing", description="It has to be one of the result closings.", unit="mm", gt=0.0, le=50.0
     )
     area_mm2: float = setting(
         title="Area",
