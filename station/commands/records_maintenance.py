@@ -81,15 +81,14 @@ def lot_list(grower: str | None, last: int, config: Path | None) -> None:
 @by_option
 @config_option
 def hold(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None) -> None:
-    """Hold the images of an inspection, or all images of a lot: the quota does not remove them."""
+    """Retain the images of an inspection, or all images of a lot: the quota does not remove them."""
     with short_transaction(folder_of(config)) as connection:
         before = read_holds(connection)
         held = place_hold(connection, _number_or_lot(thing, is_lot=is_lot), reason, by)
         if held not in before:
             append_audit(connection, AuditEntry(by, _ROLE, "images.held", held.description, reason))
-    click.echo(
-        printable(f"{held.description} is on hold since {_time(held.placed_utc_ms)}, by {held.by}: {held.reason}")
-    )
+    since = f"since {_time(held.placed_utc_ms)}, by {held.by}: {held.reason}"
+    click.echo(printable(f"the images of {held.description} are retained {since}"))
 
 
 @click.command()
@@ -99,18 +98,18 @@ def hold(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None)
 @by_option
 @config_option
 def release(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None) -> None:
-    """Release held images: the quota may remove them."""
+    """Release retained images: the quota may remove them."""
     with short_transaction(folder_of(config)) as connection:
         released = release_hold(connection, _number_or_lot(thing, is_lot=is_lot), reason, by)
         entry = AuditEntry(by, _ROLE, "images.released", released.description, reason, {"held for": released.reason})
         append_audit(connection, entry)
-    click.echo(printable(f"{released.description} is released"))
+    click.echo(printable(f"the images of {released.description} are no longer retained"))
 
 
 @click.command()
 @config_option
 def holds(config: Path | None) -> None:
-    """List what is on hold, oldest first."""
+    """List the inspections and lots whose images are retained, oldest first."""
     with reading(folder_of(config)) as connection:
         for held in read_holds(connection):
             click.echo(printable(f"{_time(held.placed_utc_ms)}  {held.description}  by {held.by}: {held.reason}"))

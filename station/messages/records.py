@@ -112,8 +112,10 @@ ANOTHER_GROWER = define(
     known=Name(),
     grower=Name(),
 )
-INSPECTION_NOT_HELD = define("records.inspection_not_held", "inspection {number} is not on hold", number=Number(0))
-LOT_NOT_HELD = define("records.lot_not_held", "lot {lot} is not on hold", lot=Name())
+INSPECTION_NOT_HELD = define(
+    "records.inspection_not_held", "the images of inspection {number} are not retained", number=Number(0)
+)
+LOT_NOT_HELD = define("records.lot_not_held", "the images of lot {lot} are not retained", lot=Name())
 NO_REASON = define("records.no_reason", "no reason was given")
 AUDIT_VALUE = define("records.audit_value", "the audit trail cannot hold {value}: {words}", value=Name(), words=Name())
 AUDIT_WORD = define(
@@ -284,7 +286,7 @@ CORRECT_LOT = define(
     "records.correct_lot",
     "give the new lot another name, or correct it: station records lot start --correct",
 )
-HOLDS_SHOW = define("records.holds_show", "`station records holds` shows what is")
+HOLDS_SHOW = define("records.holds_show", "`station records holds` lists those that are")
 GIVE_REASON = define("records.give_reason", "give a reason, for those who read it later")
 PROPER_WORD = define("records.proper_word", "give a proper {field}", field=Name())
 SHORTER_TEXT = define("records.shorter_text", "give a shorter {field}, without control characters", field=Name())

@@ -71,6 +71,13 @@ COLUMNS = (
         "as the PLC gave it with the trigger; empty where it did not",
     ),
     Column("size_class", pa.int64(), "nullif(i.size_class, 0)", "likewise"),
+    Column("recipe_revision", pa.string(), "r.revision", "of the recipe as it was; empty for none"),
+    Column(
+        "fruit_width_mm",
+        pa.float64(),
+        "CAST(json_extract(i.measures, '$.onset_mm') AS REAL)",
+        "between the jaws at the first contact; empty where there was none",
+    ),
 )
 """A list is JSON text in CSV."""
 SCHEMA = pa.schema([pa.field(column.name, column.kind) for column in COLUMNS])

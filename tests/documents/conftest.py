@@ -180,7 +180,7 @@ def page() -> Callable[[Path], Page]:
 
 @pytest.fixture(scope="session")
 def packhouse(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The home folder of a station that has inspected strawberries of lot A-17; every fourth is bruised."""
+    """The home folder of a station that has inspected strawberries of lot DEMO; every fourth is bruised."""
     home = tmp_path_factory.mktemp("packhouse") / "home"
     home.mkdir()
     asyncio.run(_inspect(home / "records", fruit=12))
@@ -211,7 +211,7 @@ async def _inspect(folder: Path, fruit: int) -> None:
             deciding = verdict.deciding
             began_ms = 1_782_828_000_000 + number * 9000
             sequence = await records.begin(
-                Trigger(number + 1, 0, "A-17", began_ms, snapshot, simulated=True, fruit_length_mm_x10=10 * length_mm)
+                Trigger(number + 1, 0, "DEMO", began_ms, snapshot, simulated=True, fruit_length_mm_x10=10 * length_mm)
             )
             steps = [Image("step", step, shown.frames[step]) for step in range(len(press.points))]
             outcome = await records.conclude(

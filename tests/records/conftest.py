@@ -96,7 +96,7 @@ def passed() -> InspectionRecord:
         duration_ms=3210,
         curve=tuple(CurvePoint(step, 30.0 - step, float(step), 8.0 * step, 11_000 * step, 0.9) for step in range(5)),
         phases_s={"approach": 0.8, "steps": 2.1},
-        measures={"growth_mm2_per_mm": 8.0},
+        measures={"growth_mm2_per_mm": 8.0, "onset_mm": 25.5},
         devices={"camera": "DIGIT D20966"},
         versions={"fruit-station": "0.1.0"},
     )

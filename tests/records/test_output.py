@@ -49,6 +49,11 @@ def test_csv_and_parquet_hold_the_same(history, ask, tmp_path, monkeypatch):
         assert (row["lot"], str(row["area_mm2"])) == (told["lot"], told["area_mm2"])
         assert len(row["images"]) == (row["outcome"] == "FAIL")
         assert told["simulated"] == "true"
+        assert (row["recipe_revision"], row["fruit_width_mm"]) == (
+            told["recipe_revision"],
+            float(told["fruit_width_mm"]),
+        )
+        assert (row["recipe_revision"], row["fruit_width_mm"]) == ("", 25.5)
 
 
 @pytest.mark.parametrize("name", ["=1+1", "+1", "-1+2", "@SUM(A1)", "\t=1", "\r=1"])
