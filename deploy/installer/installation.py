@@ -141,7 +141,7 @@ class Installation:
 
     def _make_places(self) -> None:
         self._services.make_user()
-        site_files.make_folders(self._layout)
+        site_files.make_folders(self._layout, self._source.folder / "recipes")
 
     def _switch(self) -> None:
         point(self._layout.current, self.release)

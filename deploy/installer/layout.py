@@ -66,7 +66,7 @@ class Layout:
 
     @property
     def settings(self) -> Path:
-        """The site's configuration, certificates and recipes."""
+        """The site's configuration and certificates."""
         return self.place(f"/etc/{NAME}")
 
     @property
@@ -78,6 +78,11 @@ class Layout:
     def home(self) -> Path:
         """The station's state."""
         return self.place(f"/var/lib/{NAME}")
+
+    @property
+    def recipes(self) -> Path:
+        """The site's recipes, which the pages edit."""
+        return self.home / "recipes"
 
     @property
     def backups(self) -> Path:

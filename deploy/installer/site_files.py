@@ -58,17 +58,37 @@ def put(layout: Layout, release: Path) -> None:
         new.replace(file)
 
 
-def make_folders(layout: Layout) -> None:
-    """Create the folders of configuration, state and backups, and a missing configuration file."""
+def make_folders(layout: Layout, shipped: Path) -> None:
+    """Create the folders of configuration, state and backups; a missing configuration file with the site's recipes.
+
+    Args:
+        layout: the installation.
+        shipped: folder of the shipped recipes, from which a new site's are copied.
+    """
     for path, user in ((layout.settings, "root"), (layout.home, NAME), (layout.backups, NAME)):
         make_folder(layout, path)
         path.chmod(0o750)
         own(layout, path, user, NAME)
     if not layout.configuration.exists():
-        shutil.copyfile(layout.settings / "station.example.yaml", layout.configuration)
-        print_progress(f"{layout.configuration}: the site's own from now on; all of it is commented out")
+        _make_recipes(layout, shipped)
+        text = (layout.settings / "station.example.yaml").read_text(encoding="utf-8")
+        named = text.replace("# recipes_folder: null", f'recipes_folder: "{layout.recipes}"')
+        layout.configuration.write_text(named, encoding="utf-8")
+        print_progress(f"{layout.configuration}: the site's own from now on; all but its recipes is commented out")
     layout.configuration.chmod(0o640)
     own(layout, layout.configuration, "root", NAME)
+
+
+def _make_recipes(layout: Layout, shipped: Path) -> None:
+    """Copy the shipped recipes to where the station's pages can edit them; those that are there stay."""
+    layout.recipes.mkdir(exist_ok=True)
+    for source in sorted(shipped.glob("*.yaml")):
+        if not (file := layout.recipes / source.name).exists():
+            shutil.copyfile(source, file)
+            file.chmod(0o640)
+            own(layout, file, NAME, NAME)
+    layout.recipes.chmod(0o750)
+    own(layout, layout.recipes, NAME, NAME)
 
 
 def make_folder(layout: Layout, folder: Path) -> None:

@@ -34,6 +34,11 @@ def test_interrupted_then_installed_twice_then_undone_leaves_nothing(system, roo
     program = system / "opt/fruit-station/current/venv/bin/station"
     checked = subprocess.run([program, "config", "check"], capture_output=True, text=True, check=False)
     assert checked.stdout.startswith("OK"), checked.stderr
+    recipes = system / "var/lib/fruit-station/recipes"
+    assert {path.name for path in recipes.iterdir()} == {path.name for path in (root / "recipes").glob("*.yaml")}
+    assert f'\nrecipes_folder: "{recipes}"\n' in (system / "etc/fruit-station/station.yaml").read_text()
+    (recipes / "raspberry.yaml").unlink()  # a site's own decision, which no later run undoes
+    installed = tree_of(system)
     assert (system / "etc/systemd/system/fruit-station.service").is_file()
     assert (system / "etc/systemd/system/multi-user.target.wants/fruit-station.service").is_symlink()
     assert (system / "etc/systemd/system/timers.target.wants/fruit-station-backup.timer").is_symlink()
