@@ -62,6 +62,8 @@ class Demo(NamedTuple):
     site: Configuration
     process: subprocess.Popen[bytes]
     log: Path
+    console: int
+    """The twin's."""
 
     def part(self, name: str) -> psutil.Process:
         """One of its processes."""
@@ -97,7 +99,7 @@ def demo() -> Iterator[Demo]:
         command = [sys.executable, "-m", "station", "demo", "--console", str(console), "--speed", "12"]
         with log.open("wb") as output:
             process = subprocess.Popen(command, stdout=output, stderr=output, env=environment)
-        running = Demo(load_configuration(file, {"STATION_HOME": folder}), process, log)
+        running = Demo(load_configuration(file, {"STATION_HOME": folder}), process, log, console)
         try:
             until(lambda: running.fruit() >= FRUIT_FIRST or process.poll() is not None)
             if process.poll() is not None:
@@ -178,7 +180,7 @@ def main() -> int:
     with demo() as running, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
         if asked.pictures:
-            draw(address_of(running.site.hmi), running.part("hmi"), browser)
+            draw(address_of(running.site.hmi), running.part("hmi"), browser, running.console)
         else:
             text = measure(running, browser, asked.rounds, asked.seconds)
             print(text)

@@ -7,6 +7,8 @@ import psutil
 from PIL import Image
 from playwright.sync_api import Browser, Page
 
+from station.twin.console import ask
+
 PICTURES = Path(__file__).resolve().parents[2] / "docs" / "images"
 PIN = "482915"
 FAIL_WITHIN_S = 300
@@ -28,13 +30,14 @@ PAGES = {
 }
 
 
-def draw(address: str, process: psutil.Process, browser: Browser) -> None:
+def draw(address: str, process: psutil.Process, browser: Browser, console: int) -> None:
     """Every page as a picture, at the panel's size and a phone's.
 
     Args:
         address: of the pages, at their first start.
         process: the pages'.
         browser: which draws them.
+        console: the twin's, for an alarm.
     """
     page = browser.new_context().new_page()
     page.goto(f"{address}/people")
@@ -51,12 +54,7 @@ def draw(address: str, process: psutil.Process, browser: Browser) -> None:
     page.fill("#pin", PIN)
     with page.expect_navigation():
         page.locator(".log-in .main").click()
-    page.goto(f"{address}/alarms")
-    kept_in_all_sizes(page, "alarms")
-    page.locator(".alarm h2 a").first.click()  # no recipe was chosen before the line did
-    kept_in_all_sizes(page, "alarm")
-    with page.expect_navigation():
-        page.get_by_role("button", name="Acknowledge").first.click()
+    alarm_drawn(page, address, console)
     page.goto(address)
     failed = page.locator(".tile-fail").first  # of which every image is kept
     failed.wait_for(timeout=1000 * FAIL_WITHIN_S)
@@ -66,6 +64,14 @@ def draw(address: str, process: psutil.Process, browser: Browser) -> None:
     for name, path in {**PAGES, "inspection": inspection, "step": step}.items():
         page.goto(address + path)
         kept_in_all_sizes(page, name)
+    page.goto(f"{address}/panel")
+    page.set_viewport_size({"width": 1280, "height": 800})
+    page.goto(f"{address}/history")
+    page.locator("summary").first.click()
+    page.locator("[name=lot]").click()
+    settled(page)
+    keep(page, "keyboard")
+    page.context.clear_cookies(name="station_panel")
     page.goto(f"{address}/change")
     page.locator(".fruit-tile:not(.active)").first.click()
     kept_in_all_sizes(page, "confirm")
@@ -78,6 +84,21 @@ def draw(address: str, process: psutil.Process, browser: Browser) -> None:
     process.resume()
     page.locator("body:not(.stale)").wait_for()
     page.context.close()
+
+
+def alarm_drawn(page: Page, address: str, console: int) -> None:
+    """An alarm, raised by the gripper's cable, and taken back."""
+    fault = {"device": "gripper", "fault": "off"}
+    ask("127.0.0.1", console, {"do": "set", **fault})
+    page.goto(f"{address}/alarms")
+    page.locator("#alarm-gripper_link_lost").wait_for(timeout=1000 * FAIL_WITHIN_S)
+    kept_in_all_sizes(page, "alarms")
+    page.locator("#alarm-gripper_link_lost").click()
+    kept_in_all_sizes(page, "alarm")
+    with page.expect_navigation():
+        page.get_by_role("button", name="Acknowledge").first.click()
+    ask("127.0.0.1", console, {"do": "clear", **fault})
+    page.locator(".alarm").first.wait_for(state="detached", timeout=1000 * FAIL_WITHIN_S)
 
 
 def kept_in_all_sizes(page: Page, name: str) -> None:

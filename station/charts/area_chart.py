@@ -103,7 +103,7 @@ def area_chart(
         number: formats a value with so many digits behind the decimal sign.
     """
     wide, high, text = size
-    left, right, top, bottom = round(3.6 * text), wide - text, round(1.8 * text), round(high - 2.7 * text)
+    left, right, top, bottom = round(3.6 * text), wide - text, round(2.4 * text), round(high - 2.7 * text)
     closings = [x for curve in curves for x, _ in curve.points] + [limit.closing_mm for limit in limits]
     areas = [y for curve in curves for _, y in curve.points] + [limit.area_mm2 for limit in limits]
     furthest, largest = max(closings, default=1.0), max([*areas, early_stop_mm2 or 0.0], default=1.0)
