@@ -15,7 +15,8 @@ COUNTS = st.lists(st.tuples(*[st.integers(0, 50)] * 3), min_size=1, max_size=24)
 def test_every_fruit_is_drawn_within_the_axes_whatever_its_outcome(counts, limits):
     chart = ET.fromstring(area_histogram([(5.0 * (n + 1), *each) for n, each in enumerate(counts)], limits))
     bars = [each for each in chart.iter() if each.tag.endswith("rect")]
-    heights = dict.fromkeys(("var(--good)", "var(--bad)", "var(--unjudged)"), 0.0)
+    colours: list[str] = ["var(--good)", "var(--bad)", "var(--unjudged)"]
+    heights = dict.fromkeys(colours, 0.0)
     for each in bars:
         heights[each.attrib["fill"]] += float(each.attrib["height"])
         assert 30 <= float(each.attrib["y"]) <= 207

@@ -5,7 +5,8 @@ from urllib.parse import parse_qs, urlsplit
 
 from hmi.history.chips import chips, days
 
-NO_TERMS = dict.fromkeys(("lot", "grower", "fruit", "outcome", "reason", "from", "to"), "")
+NAMES: list[str] = ["lot", "grower", "fruit", "outcome", "reason", "from", "to"]
+NO_TERMS = dict.fromkeys(NAMES, "")
 NOW = datetime(2026, 3, 1, 14, 30).astimezone()
 
 
