@@ -19,10 +19,14 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import AsyncIterator
 from contextlib import closing
 from pathlib import Path
 
 import numpy as np
+from reliability.kills import Kill, kill_once, markdown
+from reliability.rig import running
+from reliability.scenario import Expected, Scenario
 from sqlalchemy import select as select_rows
 
 from station.records.audit import GENESIS, AuditEntry, row_of
@@ -35,6 +39,9 @@ from station.records.schema import audit
 from station.settings.records import RecordsSettings
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "records-kills.md"
+WIRE_DOCUMENT = DOCUMENT.with_name("kills.md")
+WIRE_KILLS = Path(__file__).resolve().parent / "reliability" / "kills.json"
+KILLS_A_STATION = 20
 SETTINGS = RecordsSettings(deadline_s=30.0, free_reserve_mb=1, images_quota_mb=1)
 STEPS = 8
 MOST_LINES = 24
@@ -141,12 +148,45 @@ def verify(folder: Path, told: dict[str, dict[int, int]], repeated: int) -> dict
     return dict(wrong)
 
 
+async def kills_of_one_station(seed: int, number: int) -> AsyncIterator[Kill]:
+    """Kill in one station after the other fruit until it does not come back, or often enough."""
+    chance, scenario = random.Random(seed), Scenario(name="kills", fault=None, expected=Expected(outcomes=("PASS",)))
+    with tempfile.TemporaryDirectory() as place:
+        async with running(Path(place), seed, scenario, chance.choice(("nest", "arm"))) as rig:
+            for each in range(min(number, KILLS_A_STATION)):
+                kill = await kill_once(rig, chance, seed, each)
+                print(kill.model_dump_json(), flush=True)
+                yield kill
+                if kill.wrong:
+                    return
+
+
+async def kill_over_the_wire(number: int, seed: int | None) -> int:
+    """Make so many kills, and the page of all. How many of them had something wrong."""
+    kills = [Kill.model_validate(each) for each in json.loads(WIRE_KILLS.read_text())] if WIRE_KILLS.exists() else []
+    before = len(kills)
+    while len(kills) - before < number:
+        this = 1 + max((kill.seed for kill in kills), default=0) if seed is None else seed
+        async for kill in kills_of_one_station(this, number - (len(kills) - before)):
+            kills.append(kill)
+            if seed is None:
+                WIRE_KILLS.write_text(json.dumps([each.model_dump() for each in kills], indent=0) + "\n")
+                WIRE_DOCUMENT.write_text(markdown(kills), encoding="utf-8")
+        if seed is not None:
+            break
+    return sum(bool(kill.wrong) for kill in kills[before:])
+
+
 def main() -> int:
     """Kill, verify, print, and write the document."""
     parser = argparse.ArgumentParser()
+    parser.add_argument("--wire", type=int, metavar="N", help="kill processes of a whole station instead")
+    parser.add_argument("--seed", type=int, help="with --wire: of the one station to repeat")
     parser.add_argument("--rounds", type=int, default=1000)
     parser.add_argument("--json", action="store_true", help="print JSON; write no document")
     arguments = parser.parse_args()
+    if arguments.wire is not None:
+        return 1 if asyncio.run(kill_over_the_wire(arguments.wire, arguments.seed)) else 0
     told: dict[str, dict[int, int]] = {"begun": {}, "concluded": {}, "published": {}, "audited": {}}
     repeated, began_s = 0, time.perf_counter()
     with tempfile.TemporaryDirectory() as place:

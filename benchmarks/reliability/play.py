@@ -89,7 +89,7 @@ async def play(rig: Rig, scenario: Scenario, phase: Phase) -> Row:
         if scenario.fault is not None:
             await rig.end(scenario.fault)
     row.alarms = tuple(sorted(wire.alarms))
-    wrong += [] if row.skipped else _disagreements(rig, accepted_before)
+    wrong += [] if row.skipped else disagreements(rig, accepted_before)
     row.wrong = tuple(wrong)
     return row
 
@@ -164,8 +164,13 @@ async def _next_fruit(rig: Rig, wrong: list[str]) -> None:
         wrong.append("not ready after the next fruit")
 
 
-def _disagreements(rig: Rig, accepted_before: int) -> list[str]:
-    """Where wire and records do not tell one story, for each trigger accepted in this row."""
+def disagreements(rig: Rig, accepted_before: int) -> list[str]:
+    """Where wire and records do not tell one story.
+
+    Args:
+        rig: the station.
+        accepted_before: triggers that were accepted before those in question.
+    """
     wrong, wire = list[str](), rig.wire
     if wire.doubled:
         wrong.append(f"{wire.doubled} results came again after their acknowledgement")

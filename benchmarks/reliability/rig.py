@@ -13,7 +13,7 @@ import urllib.request
 from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import psutil
 
@@ -293,13 +293,16 @@ def _quick_recipes(folder: Path, measured: str) -> Path:
 
 
 @contextlib.asynccontextmanager
-async def running(folder: Path, number: int, scenario: Scenario) -> AsyncIterator[Rig]:
+async def running(
+    folder: Path, number: int, scenario: Scenario, placing: Literal["nest", "arm"] = "nest"
+) -> AsyncIterator[Rig]:
     """Start a station on addresses of its own, with the patience of a busy machine; it ends with the block.
 
     Args:
         folder: an empty one.
         number: another one for each station that this process starts.
         scenario: what will be played; the station is prepared for it.
+        placing: the service's setting.
 
     Raises:
         CannotDoError: the fault's disk or clock cannot be had.
@@ -329,6 +332,7 @@ async def running(folder: Path, number: int, scenario: Scenario) -> AsyncIterato
             "inspection_deadline_s": None,
             "retry_longest_s": 1.0,
             "uncalibrated": "allow",
+            "placing": placing,
         },
     }
     file.write_text(json.dumps(values), encoding="utf-8")

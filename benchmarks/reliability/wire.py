@@ -69,10 +69,14 @@ class Wire:
         return self._now("result_valid")
 
     @property
+    def packml(self) -> str:
+        """PackML's state; empty where the interface does not answer."""
+        return "" if self._inputs is None else BY_NAME["packml_state"].codes[int(self._inputs["packml_state"])].name
+
+    @property
     def completing(self) -> bool:
         """Whether the arm still leaves the last fruit."""
-        codes = BY_NAME["packml_state"].codes
-        return self._inputs is not None and codes[int(self._inputs["packml_state"])].name == "completing"
+        return self.packml == "completing"
 
     @property
     def standing(self) -> str:
