@@ -2,7 +2,7 @@
 
 import contextlib
 import os
-import tempfile
+import secrets
 from pathlib import Path
 
 PARTIAL = ".partial"
@@ -10,34 +10,37 @@ PARTIAL = ".partial"
 
 
 def write_atomically(
-    path: Path, data: bytes, mode: int = 0o644, *, owner: tuple[int, int] | None = None, durable: bool = True
+    path: Path, data: bytes, mode: int | None = None, *, owner: tuple[int, int] | None = None, durable: bool = True
 ) -> None:
     """Replace a file as a whole: a reader, or whoever comes after a kill or a loss of power, finds the old or the new.
 
     Args:
         path: in an existing folder.
         data: the new content.
-        mode: the new file's permissions.
+        mode: the new file's permissions, exactly; by default those that the process's umask leaves.
         owner: user and group of the new file; the process's own by default.
         durable: wait for the disk; without it a loss of power may bring the old content back, or an empty file.
 
     Raises:
         OSError: it cannot be written; the old file is as it was.
     """
-    descriptor, partial = tempfile.mkstemp(prefix=f".{path.name}.", suffix=PARTIAL, dir=path.parent)
+    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PARTIAL}")
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+    descriptor = os.open(partial, flags, 0o666 if mode is None else 0o600)
     try:
         with os.fdopen(descriptor, "wb") as file:
             file.write(data)
             file.flush()
-            os.fchmod(file.fileno(), mode)
+            if mode is not None:
+                os.fchmod(file.fileno(), mode)
             if owner is not None:
                 os.fchown(file.fileno(), *owner)
             if durable:
                 os.fsync(file.fileno())
-        Path(partial).replace(path)
+        partial.replace(path)
     except BaseException:
         with contextlib.suppress(OSError):
-            Path(partial).unlink()
+            partial.unlink()
         raise
     if durable:
         sync_folder(path.parent)

@@ -74,7 +74,11 @@ def cli() -> None:
 
 
 def main() -> NoReturn:
-    """Run the command line: exit code 0 on success, 2 on bad usage or bad input, 1 on a failure."""
+    """Run the command line: exit code 0 on success, 2 on bad usage or bad input, 1 on a failure.
+
+    What it writes is for the user and the group alone, also outside the services' unit, which sets the same.
+    """
+    os.umask(os.umask(0o027) | 0o027)
     try:
         code = cli.main(standalone_mode=False)
     except click.ClickException as error:

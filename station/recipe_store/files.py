@@ -107,7 +107,7 @@ def write_back(path: Path, text: str, home: Path) -> Path | None:
             backup = home / BACKUPS / f"{path.stem}-{stamp}{path.suffix}"
             backup.parent.mkdir(parents=True, exist_ok=True)
             write_atomically(backup, path.read_bytes())
-        mode = path.stat().st_mode & 0o777 if path.exists() else 0o644
+        mode = path.stat().st_mode & 0o777 if path.exists() else None
         write_atomically(path, text.encode(), mode)
     except OSError as error:
         raise _unwritable(path, error) from error

@@ -67,17 +67,18 @@ def open_engine(path: Path, mode: Literal["ro", "rw", "rwc"]) -> Engine:
     return engine
 
 
-def check(path: Path) -> None:
-    """Check for damage, within `CHECK_S`.
+def check(path: Path, within_s: float = CHECK_S) -> None:
+    """Check for damage; of a database that takes longer only the first part is checked.
 
     Args:
         path: the database, which exists.
+        within_s: longest time.
 
     Raises:
         DamagedError: it is damaged.
         RecordsError: it cannot be read.
     """
-    until_s = time.monotonic() + CHECK_S
+    until_s = time.monotonic() + within_s
     try:
         with closing(sqlite3.connect(path, timeout=BUSY_MS / 1000)) as connection:
             connection.set_progress_handler(lambda: time.monotonic() > until_s, 10_000)

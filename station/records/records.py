@@ -17,8 +17,8 @@ from station.channel.line import Outcome
 from station.messages import records as messages
 from station.messages.message import Message
 from station.records.audit import AuditEntry, AuditRow, append_audit
-from station.records.database import FILE_NAME, reading
-from station.records.errors import DiskFullError, RecordsClosedError, RecordsDeadlineError, RecordsError
+from station.records.database import FILE_NAME, check, reading
+from station.records.errors import DamagedError, DiskFullError, RecordsClosedError, RecordsDeadlineError, RecordsError
 from station.records.images import MB, accepted_is_stored
 from station.records.model import AlarmEntry, AlarmRow, FullRecord, InspectionRecord, OpenInspections, Trigger
 from station.records.open import Notice, Opened, lock_folder, open_records
@@ -27,6 +27,7 @@ from station.records.write_requests import (
     acknowledge,
     add_counts,
     add_event,
+    begin_again,
     conclude,
     insert_trigger,
     publish,
@@ -40,6 +41,8 @@ T = TypeVar("T")
 
 READING_S = 10.0
 """Longest wait for a query's answer."""
+DAMAGE_S = 0.5
+"""Longest search for damage while the station runs: some 500 MB of a database."""
 IMAGES_CLOSE_S = 5.0
 """Longest wait for images when the records are closed."""
 
@@ -140,6 +143,22 @@ class Records:
             os.close(self._lock)
             self._lock = None
 
+    async def find_damage(self) -> None:
+        """Look for damage while the station runs: a page that is not read would be noticed much later.
+
+        Raises:
+            RecordsError: the database is damaged, removed or cannot be read.
+        """
+        self._get()
+        path = self.folder / FILE_NAME
+
+        def find() -> None:
+            if not path.exists():
+                raise DamagedError(messages.REMOVED(path=str(path)), messages.OPEN_AGAIN())
+            check(path, DAMAGE_S)
+
+        await asyncio.get_running_loop().run_in_executor(self._helper, find)
+
     async def begin(self, trigger: Trigger) -> int:
         """Make a trigger durable and number it. Not idempotent: each call begins another inspection.
 
@@ -175,10 +194,13 @@ class Records:
             future.add_done_callback(withdraw_late)
             raise
 
-    async def conclude(self, sequence: int, record: InspectionRecord) -> Outcome:
+    async def conclude(self, sequence: int, record: InspectionRecord, begun: Trigger | None = None) -> Outcome:
         """Make an outcome durable. The first one remains: a repetition changes nothing.
 
         Images are written afterwards in the background, or dropped and reported.
+
+        Args:
+            begun: its trigger, recorded again where the database in which it began was moved aside meanwhile.
 
         Returns:
             The outcome in force: this record's, or the one that was published or concluded before.
@@ -194,9 +216,13 @@ class Records:
         dropped = messages.IMAGES_DROPPED(cause=messages.TOO_MANY_WAIT())
         state = messages.IMAGES_PENDING() if reserved else dropped if wanted else not_wanted
         accepted = state if accepted_is_stored(sequence, self._settings.accepted_share) else not_wanted
-        future = opened.writer.submit(
-            lambda connection: conclude(connection, sequence, record, {"PASS": accepted, "other": state})
-        )
+
+        def work(connection: Connection) -> tuple[Outcome, Message | None]:
+            if begun is not None and sequence <= opened.mark.value:
+                begin_again(connection, sequence, begun, self._boot)
+            return conclude(connection, sequence, record, {"PASS": accepted, "other": state})
+
+        future = opened.writer.submit(work)
         future.add_done_callback(lambda done: self._hand_over(opened, done, sequence, record, reserved=reserved))
         outcome, _ = await self._answer(future)
         return outcome

@@ -69,6 +69,12 @@ def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot
     index_hour(connection, sequence, trigger.began_utc_ms)
 
 
+def begin_again(connection: Connection, sequence: int, trigger: Trigger, boot: str) -> None:
+    """Begin an inspection that is not in this database, because the one in which it began was moved aside."""
+    if connection.scalar(select(inspections.c.sequence).where(inspections.c.sequence == sequence)) is None:
+        insert_trigger(connection, sequence, trigger, boot)
+
+
 def withdraw(connection: Connection, sequence: int) -> None:
     """Withdraw an inspection whose caller was gone when it was durable; its number is not given again."""
     connection.execute(delete(inspections).where(inspections.c.sequence == sequence, inspections.c.outcome.is_(None)))

@@ -12,7 +12,6 @@ import logging
 import os
 import signal
 import socket
-import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -24,6 +23,7 @@ from station.messages import supervision as messages
 from station.messages.message import Message, verbatim
 from station.supervision.notify import PARENT_VARIABLE, SOCKET_VARIABLE, WATCHDOG_VARIABLE, notify
 from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, publish
+from station.temporary_folder import make_temporary_folder
 
 RESTARTS = 5
 RESTARTS_WITHIN_S = 60.0
@@ -178,7 +178,7 @@ class Supervisor:
             SupervisionError: a program did not become ready at first, or one was given up; in this case when everything
                 has ended.
         """
-        with tempfile.TemporaryDirectory(prefix="station-") as folder:
+        with make_temporary_folder("fruit-station-run") as folder:
             self._restarts_file = Path(folder) / "restarts.json"
             environment = {**self._environment, RESTARTS_VARIABLE: str(self._restarts_file)}
             self._children = [_Child(program, Path(folder), environment) for program in self._programs]

@@ -22,6 +22,7 @@ from station.records.database import FILE_NAME
 from station.records.lots import end_lot, start_lot
 from station.records.restore import restore_backup
 from station.records.short_transaction import short_transaction
+from station.records.signing import public_keys_of
 from station.records.write_requests import queue_event
 from station.settings.outbox import OutboxPostgresqlSettings
 
@@ -124,7 +125,7 @@ def test_after_a_restoring_numbers_given_again_are_told(server, fill, tmp_path):
     make_backup(folder, copy)
     fill(folder, 6, 8, steps=0)
     asyncio.run(tell_all(server, folder, "restored"))
-    restore_backup(folder, copy, "ada")
+    restore_backup(folder, copy, "ada", public_keys_of(folder))
     fill(folder, 9, 10, steps=0)
     told = asyncio.run(tell_all(server, folder, "restored"))
     assert told == 1 + 2, "the restoring itself, two inspections, and not all from the first again"

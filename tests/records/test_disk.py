@@ -28,6 +28,7 @@ from station.records.errors import (
     RecordsDeadlineError,
     RecordsError,
     SequenceError,
+    UnknownInspectionError,
 )
 from station.records.high_water_mark import HighWaterMark
 from station.records.model import RecipeSnapshot, Trigger
@@ -310,6 +311,48 @@ def test_a_database_taken_away_is_noticed_and_begun_anew_on_demand(
             full = await records.inspection(sequence)
             assert (full.standing, full.judged, full.trigger.lot) == (outcome, None, "A-17")
             assert await records.begin(trigger) > sequence
+
+    scenario(steps)
+
+
+def test_an_inspection_whose_database_was_taken_away_is_concluded_in_the_new_one(
+    opened, scenario, trigger, failed, folder, ask
+):
+    async def steps():
+        async with opened() as records:
+            await records.published(await records.conclude(await records.begin(trigger), failed))
+            sequence = await records.begin(trigger)
+            for file in folder.glob("records.sqlite3*"):
+                file.unlink()
+            with pytest.raises(DamagedError, check=because(messages.REMOVED)):
+                await records.find_damage()
+            with pytest.raises(DamagedError, check=because(messages.REMOVED)):
+                await records.conclude(sequence, failed, trigger)
+            await records.reopen()
+            with pytest.raises(UnknownInspectionError):
+                await records.conclude(sequence, failed)
+            await records.published(await records.conclude(sequence, failed, trigger))
+            full = await records.inspection(sequence)
+            assert (full.trigger, full.judged.outcome, full.judged.curve) == (trigger, "FAIL", failed.curve)
+
+    scenario(steps)
+    found = ask("check").output
+    assert "fault" not in found.replace("fault: the audit trail: row", "")
+    assert "which one was the last was not known" in found or "was known to be the last" in found
+
+
+def test_damaged_pages_that_nobody_reads_are_found(opened, scenario, trigger, folder):
+    async def steps():
+        async with opened() as records:
+            for _ in range(40):
+                await records.begin(bulky(trigger, 4000))
+            await records.find_damage()
+            await records.reopen()
+            with (folder / FILE_NAME).open("r+b") as file:
+                file.seek(40_960)
+                file.write(random.Random(3).randbytes(40_960))
+            with pytest.raises(DamagedError):
+                await records.find_damage()
 
     scenario(steps)
 

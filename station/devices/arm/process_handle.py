@@ -3,12 +3,9 @@
 import asyncio
 import contextlib
 import os
-import re
-import shutil
 import sys
 import tempfile
 from collections import deque
-from pathlib import Path
 from typing import Self, TypeVar
 
 from station.channel.client import ChannelClient
@@ -16,30 +13,12 @@ from station.channel.messages import ChannelError, ChannelMessage, DeadlineError
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.messages import ArmRequest
 from station.messages import arm as messages
+from station.temporary_folder import make_temporary_folder
 
 ReplyT = TypeVar("ReplyT", bound=ChannelMessage)
 LAST_WORDS = 5
 LONGEST_LINE = 65536
-FOLDER = "fruit-station-arm-"
-_OWNED = re.compile(rf"{FOLDER}(\d{{1,9}})-.+")
-
-
-def remove_stale_folders() -> None:
-    """Remove the folders of dead stations: a killed one could not remove its own, nor could its process."""
-    for folder in Path(tempfile.gettempdir()).glob(f"{FOLDER}*"):
-        owned = _OWNED.fullmatch(folder.name)
-        if owned is not None and not _alive(int(owned[1])):
-            shutil.rmtree(folder, ignore_errors=True)
-
-
-def _alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:  # another user's
-        pass
-    return True
+FOLDER = "fruit-station-arm"
 
 
 class ArmProcess:
@@ -63,8 +42,7 @@ class ArmProcess:
         Raises:
             ArmFault: no process can be started.
         """
-        remove_stale_folders()
-        folder = tempfile.TemporaryDirectory(prefix=f"{FOLDER}{os.getpid()}-", ignore_cleanup_errors=True)
+        folder = make_temporary_folder(FOLDER)
         endpoint = f"ipc://{folder.name}/0"  # short: a socket's path has 107 bytes at most
         try:
             process = await cls._start(endpoint, host, frequency_hz)

@@ -71,6 +71,15 @@ class InspectionRegistry:
             if self.records.status().free_bytes >= reserve_bytes:
                 self._fault = None
 
+    async def find_damage(self) -> RecordsError | None:
+        """Look for damage of the records, which is a fault from then on."""
+        try:
+            await self.records.find_damage()
+        except RecordsError as error:
+            self._fault = error
+            return error
+        return None
+
     @property
     def running(self) -> Inspection | None:
         """Return the first inspection without a durable outcome, if any."""
@@ -108,7 +117,7 @@ class InspectionRegistry:
         devices = {**self._devices.names, "calibration": now.calibration}
         signed = replace(now.record(), devices=devices, versions=self._versions)
         try:
-            now.standing = await self.records.conclude(now.sequence, signed)
+            now.standing = await self.records.conclude(now.sequence, signed, now.trigger)
         except RecordsError as error:
             self._fault = error
             raise

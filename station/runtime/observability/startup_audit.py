@@ -1,7 +1,9 @@
 """Audit entries of a start, of its end, and of settings changed between two starts."""
 
 import hashlib
+import hmac
 import json
+import secrets
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -10,8 +12,9 @@ from station.runtime.state_files import StateFiles
 from station.settings.configuration import Configuration
 
 _LAST = "audited_configuration.json"
+_KEY = "audited_configuration.key"
 _HIDDEN = ("password", "secret", "token", "pin")
-"""Settings with these words in their name are audited by their hash."""
+"""Settings with these words in their name are audited by a keyed hash: a short secret cannot be found by trying."""
 
 
 def start_entries(
@@ -26,7 +29,10 @@ def start_entries(
         versions: of the programs.
         broken: error of the configuration's file; its last good form is in force then.
     """
-    values = dict(_flat(configuration.model_dump(mode="json"), ""))
+    key = state_files.read(_KEY)
+    if not key:
+        state_files.write(_KEY, key := secrets.token_bytes(32))
+    values = dict(_flat(configuration.model_dump(mode="json"), "", key))
     text = json.dumps(values, sort_keys=True)
     before = json.loads(state_files.read(_LAST) or b"null")
     state_files.write(_LAST, text.encode())
@@ -50,11 +56,11 @@ def end_entry(boot: str, *, requested: bool) -> AuditEntry:
     return AuditEntry(STATION, STATION, "service.ended", "station", "", None, {"boot": boot, "asked": requested})
 
 
-def _flat(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+def _flat(value: Any, path: str, key: bytes) -> Iterator[tuple[str, Any]]:
     if isinstance(value, dict):
         for name, inner in value.items():
-            yield from _flat(inner, f"{path}.{name}" if path else str(name))
+            yield from _flat(inner, f"{path}.{name}" if path else str(name), key)
     elif value is not None and any(word in path.rpartition(".")[2] for word in _HIDDEN):
-        yield path, f"sha256 {hashlib.sha256(str(value).encode()).hexdigest()[:16]}"
+        yield path, f"hmac-sha256 {hmac.new(key, str(value).encode(), hashlib.sha256).hexdigest()[:16]}"
     else:
         yield path, value

@@ -22,6 +22,7 @@ UPKEEP = "upkeep"
 PERIOD_S = 0.2
 _ALARMS_EVERY_S = 1.0
 _BOOK_EVERY_S = 2.0
+_DAMAGE_EVERY_S = 10.0
 _CLOCK_STEP_S = 2.0
 _RECIPE_WITHIN_S = 10.0
 """The line's time to choose a recipe, before its absence is an alarm."""
@@ -59,6 +60,7 @@ class Housekeeping:
         self._logged_ready_s = 0.0
         self._recipe_wanted_s: float | None = None
         self._alarms_at_s = 0.0
+        self._damage_at_s = 0.0
         self._clock_offset_s = time.time() - time.monotonic()
         self._pause_s, self._again_s = PERIOD_S, 0.0
         self._restarts_counted: dict[str, int] = {}
@@ -75,6 +77,9 @@ class Housekeeping:
                 self._update_alarms()
             if time.monotonic() - self._book_at_s > _BOOK_EVERY_S:
                 await self._refresh_recipes()
+            if self._service.state is State.IDLE and time.monotonic() - self._damage_at_s > _DAMAGE_EVERY_S:
+                self._damage_at_s = time.monotonic()
+                self._service.device_changed(await self._service.registry.find_damage())
             self._metrics.ready(ready=self._interlock.refusal()[0] is None)
             self._liveness.progress(UPKEEP)
             await asyncio.sleep(PERIOD_S)
