@@ -6,6 +6,7 @@ import os
 import pty
 import resource
 import shutil
+import socket
 import struct
 import subprocess
 import sys
@@ -206,6 +207,20 @@ def test_one_bad_image_costs_exit_code_2_and_no_other_result(press, analyze, tmp
     (error,) = read_table(out / "errors.csv")
     assert words in error["error"]
     assert words in (out / "report.html").read_text()
+
+
+def test_a_playlist_in_place_of_a_video_asks_nobody(press, analyze, tmp_path):
+    """So the bill of materials says of the TLS library that OpenCV brings for FFmpeg's network protocols."""
+    video = press.folder / "bad.mp4"
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.setblocking(False)
+        address = f"http://127.0.0.1:{server.getsockname()[1]}/video.ts"
+        video.write_text(f"#EXTM3U\n#EXT-X-TARGETDURATION:5\n#EXTINF:5,\n{address}\n#EXT-X-ENDLIST\n")
+        for source in (video, f"http://127.0.0.1:{server.getsockname()[1]}/video.mp4"):
+            done = analyze("--reference", press.reference, "--method", "paper", "--out", tmp_path / "out", source)
+            assert done.returncode == 2
+        with pytest.raises(BlockingIOError):
+            server.accept()
 
 
 @pytest.mark.parametrize("spoil", [spoil_text, spoil_missing, spoil_folder])

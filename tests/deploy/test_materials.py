@@ -17,7 +17,8 @@ FORBIDDEN = re.compile(
 
 
 @pytest.fixture
-def sbom(root):
+def sbom(root, monkeypatch):
+    monkeypatch.syspath_prepend(root / "deploy")
     spec = importlib.util.spec_from_file_location("sbom", root / "deploy/sbom.py")
     assert spec
     assert spec.loader
@@ -33,7 +34,7 @@ def bill(sbom):
 
 @pytest.fixture
 def hashes(sbom, root):
-    return sbom.locked((root / sbom.LOCK).read_text())
+    return sbom.locked((root / sbom.BUILD_LOCK).read_text()) | sbom.locked((root / sbom.LOCK).read_text())
 
 
 def names_of(licence: str) -> str:
@@ -49,7 +50,8 @@ def names_of(licence: str) -> str:
 
 
 def test_the_bill_is_of_the_lock(sbom, bill, hashes, root):
-    pins = {sbom.normal(pin["name"]): pin["version"] for pin in sbom.PIN.finditer((root / sbom.LOCK).read_text())}
+    texts = [(root / lock).read_text() for lock in (sbom.BUILD_LOCK, sbom.LOCK)]
+    pins = {sbom.normal(pin["name"]): pin["version"] for text in texts for pin in sbom.PIN.finditer(text)}
     billed = {sbom.normal(each["name"]): each["version"] for each in bill["components"]}
     only_elsewhere = {name for name in pins.keys() - billed.keys() if not installed(name)}
     assert len(billed) > 50
@@ -60,6 +62,40 @@ def test_the_bill_is_of_the_lock(sbom, bill, hashes, root):
         found = {one["content"] for one in each["externalReferences"][0]["hashes"]}
         assert found == set(hashes[sbom.normal(each["name"])])
         assert found
+
+
+def test_what_only_builds_the_release_is_marked(sbom, bill, root):
+    running = sbom.locked((root / sbom.LOCK).read_text())
+    excluded = {sbom.normal(each["name"]) for each in bill["components"] if each.get("scope") == "excluded"}
+    assert excluded == sbom.locked((root / sbom.BUILD_LOCK).read_text()).keys() - running.keys()
+    assert "hatchling" in excluded
+
+
+def test_the_native_libraries_of_the_wheels_are_in_the_bill(bill):
+    found = {
+        (each["name"], library["name"]): library.get("version")
+        for each in bill["components"]
+        for library in each.get("components", ())
+    }
+    opencv = "opencv-contrib-python-headless"
+    assert {(opencv, "ffmpeg"), ("psycopg-binary", "openssl"), ("psycopg-binary", "libpq")} <= found.keys()
+    assert found[opencv, "openssl"] == "1.1.1k"
+
+
+@pytest.mark.parametrize("name", ["opencv-contrib-python-headless", "psycopg-binary", "cryptography"])
+def test_a_wheel_here_brings_what_the_bill_says(sbom, bill, name):
+    if not installed(name):
+        pytest.skip(f"{name} is not installed")
+    (billed,) = (each for each in bill["components"] if sbom.normal(each["name"]) == name)
+    assert sbom.native_libraries(importlib.metadata.distribution(name)) == billed["components"], "renew: deploy/sbom.py"
+
+
+def test_what_is_past_its_end_of_life_is_said_to_be_out_of_reach(bill):
+    refs = {library["bom-ref"] for each in bill["components"] for library in each.get("components", ())}
+    old = {ref for ref in refs if re.search(r"openssl@(0|1)\.", ref)}
+    analysed = {each["ref"] for found in bill["vulnerabilities"] for each in found["affects"]}
+    assert old == analysed
+    assert {found["analysis"]["justification"] for found in bill["vulnerabilities"]} == {"code_not_reachable"}
 
 
 def test_the_bill_is_cyclonedx(sbom):
