@@ -30,7 +30,7 @@ _TEXTS = {
     "openssl": rb"OpenSSL (\d+\.\d+\.\d+[a-z]*)[ \0]",
     "ffmpeg": rb"FFmpeg version n?(\d+\.\d+(?:\.\d+)?)",
     "libpng": rb"libpng version (\d+\.\d+\.\d+)",
-    "zlib": rb"(?:de|in)flate (\d+\.\d+(?:\.\d+)*) Copyright",
+    "zlib": rb"(?:deflate|inflate) (\d+\.\d+(?:\.\d+)*) Copyright",
     "libcurl": rb"libcurl/(\d+\.\d+\.\d+)",
     "libjpeg-turbo": rb"libjpeg-turbo (?:version |\(ver )(\d+\.\d+\.\d+)",
     "libtiff": rb"(?:LIBTIFF, Version |TIFF: +build \(ver \d+ - )(\d+\.\d+\.\d+)",

@@ -144,7 +144,7 @@ class Records:
             self._lock = None
 
     async def find_damage(self) -> None:
-        """Look for damage while the station runs: a page that is not read would be noticed much later.
+        """Check for damage while the station runs: a page that is not read would be noticed much later.
 
         Raises:
             RecordsError: the database is damaged, removed or cannot be read.

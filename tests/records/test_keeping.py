@@ -179,7 +179,7 @@ def test_images_that_a_backup_could_not_copy_are_lost_after_its_restore(
     assert "note: 1 images were removed or missing" in ask("backup", tmp_path / "copy").output
     assert "restored 2 inspections and 1 images" in ask("restore", tmp_path / "copy").output
     assert ask("check").exit_code == 0
-    assert "lost: 1 of its files were found missing" in ask("show", 1).output + ask("show", 2).output
+    assert "1 of their files are missing" in ask("show", 1).output + ask("show", 2).output
 
 
 def test_a_backup_needs_its_space_and_leaves_nothing_half_made(opened, scenario, inspected, noise, folder, small_disk):

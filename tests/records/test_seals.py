@@ -5,6 +5,7 @@ import sqlite3
 from dataclasses import replace
 
 from station.channel.line import Reason
+from station.messages import records as messages
 from station.records.database import FILE_NAME
 
 
@@ -19,7 +20,7 @@ def test_what_the_station_does_itself_is_no_fault(
                 record = replace(failed, images=(noise(side_px=320, step=number),))
                 await records.published(await records.conclude(await records.begin(trigger), record))
                 await settled(records)
-            assert (await records.inspection(1)).images_state.startswith("removed")
+            assert (await records.inspection(1)).images_state == messages.IMAGES_REMOVED()
             outcome = await records.conclude(await records.begin(trigger), passed)
             late = outcome.model_copy(update={"outcome": "NO_RESULT", "reasons": (Reason.LATE,), "late": True})
             await records.published(late)

@@ -72,7 +72,7 @@ class InspectionRegistry:
                 self._fault = None
 
     async def find_damage(self) -> RecordsError | None:
-        """Look for damage of the records, which is a fault from then on."""
+        """Check the records for damage, which is a fault from then on."""
         try:
             await self.records.find_damage()
         except RecordsError as error:
