@@ -65,14 +65,18 @@ STAGES = (
 class Trace(NamedTuple):
     """What one step of a press hands on to the next."""
 
-    coefficients: Coefficients
-    """Of the background model."""
+    coefficients: Coefficients | None
+    """Of the background model; None where the step itself shows nothing."""
     floor: Mask | None
     """The contact so far, at half the working size, 0 or 1; None before one is trusted or confirmed."""
     floor_load_levels: float
     """How much the whole image differed then."""
     contact: Mask
     """The contact at the last step, trusted or not, at half the working size, 0 or 1."""
+    least: Mask
+    """What was returned there: the contact, with what a doubtful step takes over; at the input's size, 0 or 255."""
+    load_levels: float
+    """How much the whole image differed there."""
     changed_px: int
     """The changed area at the last step, px of half the working size."""
     textured: bool | None
@@ -111,6 +115,8 @@ class State:
     outlines: list[Outline] = field(default_factory=list)
     mask: Mask = field(init=False)
     """At the input's size, 0 or 255."""
+    contact: Mask = field(init=False)
+    """What this step itself shows of it, with the floor, at half the working size, 0 or 1."""
     flags: set[Flag] = field(default_factory=set)
     confidence: float = 0.0
 
@@ -200,6 +206,7 @@ class RobustMethod:
             self._find_weak_contact,
             self._keep_floor,
             self._draw,
+            self._keep_least,
             self._judge,
         )
 
@@ -396,6 +403,19 @@ class RobustMethod:
             kept = state.before.floor if lost and state.before.floor is not None else state.floor
             floor = cv2.resize(kept, (width, height), interpolation=cv2.INTER_NEAREST)
             state.mask |= np.asarray(floor * 255, np.uint8)
+        shape = state.changed.shape
+        contact = cv2.resize(state.mask, (shape[1], shape[0]), interpolation=cv2.INTER_NEAREST)
+        state.contact = np.asarray(contact > 0, np.uint8)
+
+    def _keep_least(self, state: State) -> None:
+        """Return at least what the step before did where no edge is trusted: compression only rises."""
+        before, least = state.before, self._parameters.least_confidence
+        if before is None or not before.least.any() or self._parameters.contacts == "several":
+            return
+        trusted = state.outlines and all(self._confidence(one, state) >= least for one in state.outlines)
+        if not trusted and state.load_levels >= self._constants.released_share * before.load_levels:
+            state.mask = state.mask | before.least
+            state.flags.add(Flag.LOWER_BOUND)
 
     def _judge(self, state: State) -> None:
         """Set the flags, and the weakest contact's confidence; without a contact 1 to 0 as the threshold is reached."""
@@ -407,7 +427,7 @@ class RobustMethod:
         saturated = cv2.max(cv2.max(blue, green), red) >= SATURATED_LEVEL
         if np.mean(saturated[inside] if inside.any() else saturated) > p.saturated_share:
             flags.add(Flag.SATURATED)
-        touched = bool(state.outlines) or state.floor is not None
+        touched = bool(state.outlines) or Flag.LOWER_BOUND in flags
         if not touched and (state.gate > 1 or state.weak_at):
             flags.add(Flag.UNDECIDED)
         if not touched:
@@ -481,20 +501,20 @@ class RobustMethod:
         return self._weak.response(state.frame)
 
     def _trace(self, state: State) -> Trace | None:
+        if not state.mask.any():
+            return None
+        # A press begins with its first contact: what drifted before says little about its light.
         if not state.outlines and state.floor is None:
-            return None  # a press begins with its first contact: what drifted before says little about its light
+            return Trace(None, None, 0.0, state.contact, state.mask, state.load_levels, 0, None)
         before, background = state.before, state.background
         known = background.share >= self._constants.known_share / 2
-        shape = state.changed.shape
-        mask = cv2.resize(state.mask, (shape[1], shape[0]), interpolation=cv2.INTER_NEAREST)
-        mask = np.asarray(mask > 0, np.uint8)
+        contact = state.contact
         floor, load_levels = state.floor, 0.0 if before is None else before.floor_load_levels
-        contact_px = cv2.countNonZero(mask)
-        if contact_px and not state.weak_at and Flag.LOW_CONFIDENCE not in state.flags:
+        if contact.any() and not state.weak_at and Flag.LOW_CONFIDENCE not in state.flags:
             # Together with what was known: each step may seem to shrink a little, and many must not add up.
             known_before = None if before is None or state.floor is None else before.floor
-            floor, load_levels = mask if known_before is None else mask | known_before, state.load_levels
-        elif before is not None and self._confirms(mask, before.contact):
+            floor, load_levels = contact if known_before is None else contact | known_before, state.load_levels
+        elif before is not None and self._confirms(contact, before.contact):
             floor = before.contact if floor is None else floor | before.contact
             load_levels = max(load_levels, state.load_levels)
         textured = None if before is None else before.textured
@@ -502,7 +522,8 @@ class RobustMethod:
             textured = state.outlines[0].textured
         # What is fitted with hardly any background would take in more of the contact from step to step.
         coefficients = background.coefficients if known or before is None else before.coefficients
-        return Trace(coefficients, floor, load_levels, mask, cv2.countNonZero(state.changed), textured)
+        changed_px = cv2.countNonZero(state.changed)
+        return Trace(coefficients, floor, load_levels, contact, state.mask, state.load_levels, changed_px, textured)
 
     def _confirms(self, contact: Mask, before: Mask) -> bool:
         """Whether a contact holds nearly all of the last step's: chance does not."""

@@ -227,3 +227,15 @@ def test_each_tracker_follows_its_own_press(presses):
         for tracker, press in zip([press.tracker() for press in (one, other)], (one, other), strict=True)
     ]
     assert both == again
+
+
+def test_a_doubtful_step_returns_at_least_what_the_step_before_did_until_the_body_is_let_go():
+    doubting = RobustParameters(least_confidence=1.0)
+    one = press(0, covered=(0.3, 0.25, 0.0))
+    tracker = PressTracker(RobustMethod(one.references, doubting), doubting.least_confidence)
+    larger, smaller, released = (tracker.measure_step(step.frames[:1]) for step in one.steps)
+    assert Flag.LOW_CONFIDENCE in larger.flags
+    assert Flag.LOWER_BOUND not in larger.flags
+    assert not np.any((larger.mask > 0) & (smaller.mask == 0))
+    assert {Flag.LOWER_BOUND, Flag.LOW_CONFIDENCE} <= smaller.flags
+    assert not released.found
