@@ -93,6 +93,7 @@ def door():
                 async def pieces():
                     while True:
                         yield bytes(1_000_000)
+                        await asyncio.sleep(0)  # what has nobody to send to does not wait
 
                 return StreamingResponse(pieces())
 
