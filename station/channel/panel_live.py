@@ -92,8 +92,8 @@ class GetPanelState(ChannelMessage):
     """Query the operator's summary. Answered with `PanelState`."""
 
     purpose: ClassVar[str] = "for its state"
-    flooded_by: str = Field(default="", max_length=64)
-    """The address that floods the pages with connections; empty for none."""
+    flooded_by: str | None = Field(default=None, max_length=64)
+    """The address that floods the pages with connections; empty for none, null from who serves none."""
 
 
 class RecipeNames(ChannelMessage):

@@ -111,7 +111,7 @@ def test_clients_that_never_ask_close_the_pages_to_nobody(people, eventually, cr
     assert viewer.ask("GET", "/")[0] == 200
     assert viewer.ask("GET", "/api/openapi.json")[0] == 200
     stop_and_start(people, person)
-    eventually(lambda: flood_of(people) == source)
+    eventually(lambda: flood_of(people) in {STRANGER, NEIGHBOUR})  # the detail is of when the alarm was raised
     eventually(lambda: process.num_fds() <= files + 8, 30)
     stop_and_start(people, person)
 

@@ -115,7 +115,9 @@ class PanelServer:
         return messages.PAGES_SILENT(age_s=age_s) if age_s > SILENT_S else None
 
     async def _state(self, request: GetPanelState) -> PanelState:
-        self._heard_s, self.flooded_by = time.monotonic(), request.flooded_by
+        self._heard_s = time.monotonic()
+        if request.flooded_by is not None:
+            self.flooded_by = request.flooded_by
         service, line = self._service, self._interlock.state()
         facts, active = STATES[service.state], service.active
         report = self._plc_commands.last_report
