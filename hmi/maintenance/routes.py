@@ -1,9 +1,10 @@
-"""Maintenance page: health, manual control, live image, calibration, PLC registers, log."""
+"""Maintenance page: health, support bundle, manual control, live image, calibration, PLC registers, log."""
 
 import asyncio
 import re
 import time
 from collections import OrderedDict
+from datetime import UTC, datetime
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Form, Query, Request
@@ -11,7 +12,7 @@ from pydantic import StringConstraints
 from starlette.responses import Response
 
 from hmi.maintenance.histogram import histogram
-from hmi.web.access import HmiNow, LocaleNow, orders
+from hmi.web.access import HmiNow, LocaleNow, may, orders
 from hmi.web.context import Hmi
 from hmi.web.gateway import actor_of
 from hmi.web.navigation import Entry
@@ -26,6 +27,7 @@ from station.channel.panel_live import (
     OperatorCommand,
     OperatorCommandName,
     OperatorCommandView,
+    PersonNoted,
     Recipes,
 )
 from station.channel.panel_maintenance_queries import (
@@ -76,6 +78,16 @@ async def health(request: Request, hmi: HmiNow) -> Response:
 async def health_part(hmi: HmiNow, locale: LocaleNow) -> Response:
     """Render the same as a part, for polling."""
     return await _part(hmi, locale, "maintenance_health.html.j2", await _health(hmi))
+
+
+@router.get("/support.zip")
+async def support(hmi: HmiNow, caller: Annotated[Caller, Depends(may(Right.MAINTAIN))]) -> Response:
+    """Send a support bundle for download."""
+    data = await hmi.past.support_bundle()
+    await hmi.gateway.note(PersonNoted(person=actor_of(caller), what="support_bundle"))
+    name = f"support-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.zip"
+    headers = {"content-disposition": f'attachment; filename="{name}"'}
+    return Response(data, media_type="application/zip", headers=headers)
 
 
 @router.get("/hand")

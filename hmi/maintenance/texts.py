@@ -8,6 +8,14 @@ define("maintenance.tab_image", "Live image")
 define("maintenance.tab_sensor", "Sensor")
 define("maintenance.tab_registers", "PLC registers")
 define("maintenance.tab_log", "Log")
+define("maintenance.support", "Support bundle")
+define(
+    "maintenance.support_text",
+    "One ZIP file with versions, configuration, recipes, logs, alarms and the last inspections. Passwords, PINs, keys,"
+    " people, the audit trail and images are not in it.",
+)
+define("maintenance.support_get", "Download the support bundle")
+define("maintenance.support_log_in", "To download it, log in as maintenance.")
 define("maintenance.part", "Part")
 define("maintenance.state", "State")
 define("maintenance.heard", "Last signal")

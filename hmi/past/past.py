@@ -1,9 +1,10 @@
-"""Inspections, lots, audit trail and pictures as the pages show them, read from the records by this process.
+"""Inspections, lots, audit trail, pictures and support bundle, read from the records by this process.
 
 Nothing here reaches the station: a page that searches millions of rows, or measures a stored image again, costs the
 cycle nothing but a share of the processor.
 """
 
+import io
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -32,6 +33,8 @@ from station.records.lots import read_lots
 from station.records.model import FullRecord
 from station.records.queries import Summary, read_inspection
 from station.records.search import Query, find_page
+from station.settings.configuration import Configuration
+from station.support.bundle import bundle
 
 __all__ = ["PanelBusyError", "Past", "RecordsError", "UnknownInspectionError"]
 
@@ -44,11 +47,11 @@ class Past:
     Each method raises `RecordsError` if they cannot be read, and `PanelBusyError` if too many wait or one takes 20 s.
 
     Args:
-        folder: of the records.
+        site: the configuration in force.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._folder, self._worker = folder, PanelWorker()
+    def __init__(self, site: Configuration) -> None:
+        self._site, self._folder, self._worker = site, site.home / "records", PanelWorker()
 
     def __enter__(self) -> Self:
         cv2.setNumThreads(1)  # a page that measures an image must leave the other cores to the cycle
@@ -137,6 +140,16 @@ class Past:
     async def stages(self, sequence: int, step: int) -> Stages:
         """Measure one step's stored image again, and return the measurement's stages."""
         return await self._worker.do(lambda: read_stages(self._folder, sequence, step))
+
+    async def support_bundle(self) -> bytes:
+        """Return what `station support` writes, a ZIP file."""
+
+        def write() -> bytes:
+            file = io.BytesIO()
+            bundle(self._site, file)
+            return file.getvalue()
+
+        return await self._worker.do(write)
 
 
 def _row(row: Summary) -> InspectionRow:

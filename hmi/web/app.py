@@ -52,7 +52,7 @@ def make_context(site: Configuration) -> Hmi:
     return Hmi(
         settings=settings,
         gateway=gateway,
-        past=Past(site.home / "records"),
+        past=Past(site),
         sessions=Sessions(settings.idle_s),
         people=UserStore(site.home / FOLDER),
         pins=LoginRateLimiter(),

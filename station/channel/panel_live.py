@@ -69,7 +69,7 @@ class OperatorCommandView(ChannelMessage):
 
 
 class PersonNoted(ChannelMessage):
-    """An event of a person's log-in or rights, for the audit trail. Answered with `line.Noted`."""
+    """An event of a person at the pages, for the audit trail. Answered with `line.Noted`."""
 
     purpose: ClassVar[str] = "to note who is at the panel"
     person: Actor
@@ -84,6 +84,7 @@ class PersonNoted(ChannelMessage):
         "cleaning",
         "unlocked",
         "token_refused",
+        "support_bundle",
     ]
     subject: str = Field(default="", max_length=200)
 

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from importlib.metadata import distributions, version
 from pathlib import Path
+from typing import IO
 
 from station.errors import StationError
 from station.records.database import reading, records_folder
@@ -32,12 +33,12 @@ _INSPECTIONS_LISTED, _INSPECTIONS_WHOLE, _ALARMS = 200, 20, 1_000
 _ANSWER_LIMIT_S = 2.0
 
 
-def bundle(site: Configuration, target: Path) -> tuple[str, ...]:
+def bundle(site: Configuration, target: Path | IO[bytes]) -> tuple[str, ...]:
     """Write the bundle; a part that cannot be had is replaced by the reason, as a station in trouble has few parts.
 
     Args:
         site: the configuration in force.
-        target: the ZIP file to write.
+        target: the ZIP file to write, or an open one.
 
     Returns:
         The names of the parts.

@@ -1,6 +1,8 @@
 """The maintenance page in a real browser: jogging, live image, registers, verification."""
 
+import json
 import re
+import zipfile
 from collections.abc import Callable
 from typing import Any
 
@@ -114,3 +116,22 @@ def test_a_verification_without_a_calibration_says_what_to_do(orchard: Any, pane
         expect(page.get_by_role("button", name="Calibrate")).to_be_visible()
         assert page.get_by_role("button", name="Verify").count() == 0
         assert page.get_by_text("None yet.").count() == 2
+
+
+def test_maintenance_downloads_a_support_bundle_and_a_viewer_does_not(
+    orchard: Any, panel: Any, eventually: Callable[..., Any]
+) -> None:
+    viewer = panel()
+    assert viewer.go("/maintenance").get_by_role("link", name="Download the support bundle").count() == 0
+    assert viewer.context.request.get(f"{viewer.address}/maintenance/support.zip").status == 403
+    page = panel("Max").go("/maintenance")
+    with page.expect_download() as coming:
+        page.get_by_role("link", name="Download the support bundle").click()
+    assert re.fullmatch(r"support-\d{8}T\d{6}Z\.zip", coming.value.suggested_filename)
+    with zipfile.ZipFile(coming.value.path()) as archive:
+        parts = {name: archive.read(name).decode() for name in archive.namelist()}
+    assert json.loads(parts["configuration.json"])["home"] == str(orchard.home)
+    assert "LOT 1" in parts["inspections.txt"], "by the station's own records"
+    assert "fruit" in parts["metrics.txt"], "by the running station"
+    assert not any("$argon2" in text for text in parts.values())
+    eventually(lambda: [row for row in audited(orchard, "panel.support_bundle") if row.who == "Max"])
