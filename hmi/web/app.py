@@ -5,6 +5,7 @@ import contextlib
 import logging
 import uuid
 from collections.abc import AsyncIterator
+from pathlib import Path
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -40,8 +41,12 @@ _SWEEP_S = 1.0
 log = logging.getLogger(__name__)
 
 
-def make_context(site: Configuration) -> Hmi:
+def make_context(site: Configuration, file: Path | None) -> Hmi:
     """Make the parts that all pages use; the gateway is not entered yet.
+
+    Args:
+        site: the site's configuration.
+        file: it was read from; None for none.
 
     Raises:
         StationError: the user store cannot be read, or the endpoint is none.
@@ -61,6 +66,7 @@ def make_context(site: Configuration) -> Hmi:
         live=Live(parts(), renderer, gateway, boot, stream_places(settings.pages_per_address)),
         boot=boot,
         ball_recipe=site.calibration.recipe,
+        configuration_file=file,
     )
 
 

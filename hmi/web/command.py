@@ -7,7 +7,7 @@ import click
 
 from hmi.web.process import serve
 from station.logs import configure_logging
-from station.settings.configuration import load_configuration
+from station.settings.configuration import configuration_file, load_configuration
 
 
 @click.command("hmi")
@@ -19,4 +19,4 @@ def hmi(config: Path | None) -> None:
     themselves.
     """
     configure_logging("hmi")
-    asyncio.run(serve(load_configuration(config)))
+    asyncio.run(serve(load_configuration(config), configuration_file(config)))

@@ -1,6 +1,7 @@
 """Parts that all pages use."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from hmi.past.past import Past
 from hmi.web.assets import Assets
@@ -29,3 +30,5 @@ class Hmi:
     boot: str
     ball_recipe: str
     """Name of the calibration ball's recipe, which is no fruit to choose."""
+    configuration_file: Path | None
+    """The `station.yaml` in use; None where the defaults are."""

@@ -4,6 +4,7 @@ import asyncio
 import logging
 import signal
 import ssl
+from pathlib import Path
 
 from starlette.types import ASGIApp
 
@@ -24,11 +25,12 @@ LOOPBACK = ("127.", "::1", "localhost")
 log = logging.getLogger(__name__)
 
 
-async def serve(site: Configuration) -> None:
+async def serve(site: Configuration, file: Path | None) -> None:
     """Serve the pages until SIGINT or SIGTERM.
 
     Args:
         site: the site's configuration.
+        file: it was read from; None for none.
 
     Raises:
         StationError: the address, a certificate or the user store cannot be used.
@@ -36,7 +38,7 @@ async def serve(site: Configuration) -> None:
     ended = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, ended.set)
-    hmi = make_context(site)
+    hmi = make_context(site, file)
     limits = Limits(MOST_CONNECTIONS, CONNECTIONS_PER_PAGE * site.hmi.pages_per_address, RESERVED_CONNECTIONS)
     listener = listen(site.hmi.host, site.hmi.port, "hmi", "the pages", limits, hmi.pins.knows)
     hmi.gateway.flooded_by = lambda: listener.flooded_by

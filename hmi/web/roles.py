@@ -29,6 +29,8 @@ class Right(StrEnum):
     MAINTAIN = "maintain"
     """Mode, jog, lights, calibration and verification."""
     MANAGE_PEOPLE = "manage_people"
+    CONFIGURE = "configure"
+    """See and edit `station.yaml`."""
 
 
 _OPERATING = frozenset({Right.RUN, Right.CHANGE_FRUIT, Right.HANDLE_ALARMS})

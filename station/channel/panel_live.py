@@ -6,7 +6,7 @@ Every command names its author and role, for the audit trail.
 from enum import StrEnum
 from typing import ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, JsonValue
 
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor, ListedAlarm, RecoveryName
@@ -85,8 +85,12 @@ class PersonNoted(ChannelMessage):
         "unlocked",
         "token_refused",
         "support_bundle",
+        "configuration_saved",
     ]
     subject: str = Field(default="", max_length=200)
+    old: dict[str, JsonValue] = Field(default_factory=dict)
+    """What was changed, before and after it; mostly empty."""
+    new: dict[str, JsonValue] = Field(default_factory=dict)
 
 
 class GetPanelState(ChannelMessage):

@@ -15,6 +15,7 @@ from station.settings.calibration import CalibrationSettings
 from station.settings.camera import CameraSettings
 from station.settings.can import CanSettings
 from station.settings.environment import CONFIG_VARIABLE, PLACE, named, overrides, variable
+from station.settings.file_content import check_size
 from station.settings.gripper import GripperSettings
 from station.settings.hmi import HmiSettings
 from station.settings.modbus import ModbusSettings
@@ -23,13 +24,13 @@ from station.settings.network import Host
 from station.settings.outbox import OutboxSettings
 from station.settings.paths import Folder
 from station.settings.plc import HandshakeSettings
-from station.settings.problems import FieldError, Problem, SettingsError, dotted, field_name
+from station.settings.problems import FieldError, Problem, SettingsError, dotted, field_name, shortened
 from station.settings.problems import Path as Where
 from station.settings.records import RecordsSettings
 from station.settings.schema import branches, leaves, schema_of
 from station.settings.service import ServiceSettings
 from station.settings.validation import validated
-from station.settings.yaml_loader import Document, read_document
+from station.settings.yaml_loader import Document, parse_document, read_document
 
 FILE_NAME = "station.yaml"
 
@@ -129,10 +130,27 @@ def load_configuration(file: Path | None = None, environ: Mapping[str, str] | No
         SettingsError: all problems of the environment and of the file.
     """
     environ = os.environ if environ is None else environ
+    chosen = configuration_file(file, environ)
+    return _loaded(read_document(chosen) if chosen else Document("default", None, {}), chosen, environ)
+
+
+def check_configuration(content: bytes, file: Path) -> Configuration:
+    """Read a configuration as `load_configuration` would, if the file had this content.
+
+    Args:
+        content: of the file.
+        file: whose folder relative paths start from.
+
+    Raises:
+        SettingsError: all problems of the environment and of the content.
+    """
+    check_size(content, file)
+    return _loaded(parse_document(content, shortened(str(file), 1000)), file, os.environ)
+
+
+def _loaded(document: Document, chosen: Path | None, environ: Mapping[str, str]) -> Configuration:
     root = schema_of(Configuration)
     given, problems = overrides(root, environ)
-    chosen = _file(file, environ)
-    document = read_document(chosen) if chosen else Document("default", None, {})
     merged = document.value if document.value is not None else {}
     for path, value in given.items():
         merged = _with(merged, path, value)
@@ -148,8 +166,17 @@ def load_configuration(file: Path | None = None, environ: Mapping[str, str] | No
     return validated(Configuration, document, merged, locate)
 
 
-def _file(file: Path | None, environ: Mapping[str, str]) -> Path | None:
-    """Return the configuration file to read, or None for none."""
+def configuration_file(file: Path | None = None, environ: Mapping[str, str] | None = None) -> Path | None:
+    """Return the file that `load_configuration` reads, or None for none.
+
+    Args:
+        file: the file that the user named.
+        environ: the environment; the process's own by default.
+
+    Raises:
+        SettingsError: the environment names none.
+    """
+    environ = os.environ if environ is None else environ
     if file is not None:
         return file
     if CONFIG_VARIABLE in environ:

@@ -31,9 +31,18 @@ def read_content(path: Path) -> bytes:
     except (OSError, ValueError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise SettingsError([_problem(path, messages.UNREADABLE(error=reason.lower()))]) from error
+    check_size(content, path)
+    return content
+
+
+def check_size(content: bytes, path: Path) -> None:
+    """Refuse a file's content that `read_content` would not take.
+
+    Raises:
+        SettingsError: it is too large.
+    """
     if len(content) > LARGEST_FILE_BYTES:
         raise SettingsError([_problem(path, messages.TOO_LARGE(limit_kib=LARGEST_FILE_BYTES // 1024))])
-    return content
 
 
 def _problem(path: Path, expected: Message) -> Problem:

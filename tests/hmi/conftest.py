@@ -514,7 +514,8 @@ class Pages:
 def pages(tmp_path: Path) -> Pages:
     """The web application over a station that is not there."""
     site = load_configuration(None, {"STATION_HOME": str(tmp_path)})
-    context = make_context(site)
+    file = tmp_path / "station.yaml"
+    context = make_context(site, file)
     return Pages(make_app(context), context)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 
 from station.records.audit_report import read_audit
@@ -135,3 +136,36 @@ def test_maintenance_downloads_a_support_bundle_and_a_viewer_does_not(
     assert "fruit" in parts["metrics.txt"], "by the running station"
     assert not any("$argon2" in text for text in parts.values())
     eventually(lambda: [row for row in audited(orchard, "panel.support_bundle") if row.who == "Max"])
+
+
+def test_an_administrator_edits_the_configuration_and_takes_it_back(
+    orchard: Any, panel: Any, eventually: Callable[..., Any]
+) -> None:
+    assert panel("Max").go("/maintenance").get_by_role("link", name="Configuration").count() == 0
+    file = orchard.home.parent / "station.yaml"
+    before = file.read_text()
+    page = panel("Ada").go("/maintenance")
+    page.get_by_role("link", name="Configuration").click()
+    text = page.get_by_label("Text of the file")
+    expect(text).to_have_value(before)
+    text.fill(f"# why\n{before}\nmodbus: 3\n")
+    page.get_by_role("button", name="Check and save").click()
+    expect(page.locator("[data-mistakes]")).to_contain_text("Line 3")
+    assert file.read_text() == before
+    found = [each for each in Axe().run(page).response["violations"] if each["impact"] in {"serious", "critical"}]
+    assert not found, [(each["id"], [node["target"] for node in each["nodes"][:3]]) for each in found]
+    for width_px in (1280, 390):
+        page.set_viewport_size({"width": width_px, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth"), width_px
+    text.fill(before.replace('"idle_s": 3600.0', '"idle_s": 3000.0'))
+    page.get_by_role("button", name="Check and save").click()
+    expect(page.get_by_text("Saved. It takes effect at the next start.")).to_be_visible()
+    assert '"idle_s": 3000.0' in file.read_text()
+    page.get_by_role("button", name="Put the former file back").click()
+    expect(page.get_by_label("Text of the file")).to_have_value(before)
+    assert file.read_text() == before
+    rows = eventually(lambda: (all_ := audited(orchard, "panel.configuration_saved"))[1:] and all_)
+    assert [(json.loads(row.old), json.loads(row.new)) for row in rows] == [
+        ({"hmi.idle_s": 3000.0}, {"hmi.idle_s": 3600.0}),
+        ({"hmi.idle_s": 3600.0}, {"hmi.idle_s": 3000.0}),
+    ]

@@ -193,7 +193,9 @@ class PanelServer:
         return await self._operator_commands.start(request)
 
     async def _person(self, request: PersonNoted) -> Noted:
-        entry = AuditEntry(request.person.who, request.person.role, f"panel.{request.what}", request.subject)
+        person, action = request.person, f"panel.{request.what}"
+        old, new = request.old or None, request.new or None
+        entry = AuditEntry(person.who, person.role, action, request.subject, old=old, new=new)
         self._audit.log(entry)
         return Noted()
 

@@ -1,0 +1,1 @@
+"""Page Configuration, a part of Maintenance."""
