@@ -25,6 +25,8 @@ class OutcomeMonitor:
 
     def add(self, outcome: Outcome) -> None:
         """Add one outcome."""
+        if not outcome.late:
+            self._alarms.clear(AlarmId.DEADLINE_MISSED)
         self._last.append(outcome.outcome)
         last = list(self._last)
         unjudged = last[-_MANY:] == ["NO_RESULT"] * _MANY
