@@ -109,6 +109,7 @@ def refuse_as_lost(work: Work) -> None:
     """Refuse as station lost; if the station began it, its result is never published."""
     pending = work.state.pending
     if pending is not None:
+        work.durable = True
         work.update_journal(disowned=(*work.state.journal.disowned, pending.trigger_id)[-8:])
     refuse_pending(work, Refusal.STATION_LOST)
 

@@ -55,7 +55,7 @@ class Journal(_Persistent):
     queue: tuple[Outcome, ...] = ()
     """Not acknowledged, in order of sequence."""
     verdicts: tuple[Outcome, ...] = ()
-    """Outcomes that the interface itself gave and that the station has not noted yet."""
+    """Final outcomes that the station has not noted yet: its own, and those that the interface gave."""
     disowned: tuple[int, ...] = ()
     """Ids of refused triggers that the station may have accepted, under sequences after `highest`."""
     hidden: tuple[int, ...] = ()

@@ -39,8 +39,7 @@ def step(before: State, event: Event, settings: HandshakeSettings) -> tuple[Stat
         work.update_journal(**changes)
     if state.journal == before.journal:
         return state, tuple(work.actions)
-    durable = (state.journal.verdicts, state.journal.disowned) != (before.journal.verdicts, before.journal.disowned)
-    return state, (SaveJournal(state.journal, durable), *work.actions)
+    return state, (SaveJournal(state.journal, work.durable), *work.actions)
 
 
 def next_due_s(state: State) -> float | None:

@@ -7,8 +7,8 @@ from plc_interface.handshake.modes import Signal
 from plc_interface.handshake.work import Work
 from station.channel.line import Outcome, Reason
 
-MOST_OWN_OUTCOMES = 64
-"""Maximum number of the interface's own outcomes that a station has not noted."""
+MOST_UNNOTED = 64
+"""Maximum number of outcomes that a station has not noted."""
 
 _COUNTED = {"PASS": "count_pass", "FAIL": "count_fail", "NO_RESULT": "count_no_result"}
 
@@ -59,9 +59,13 @@ def is_sound(outcome: Outcome) -> bool:
 
 
 def queue(work: Work, outcome: Outcome) -> None:
-    """Queue an outcome for the PLC and publish it. From here on it is final."""
+    """Queue an outcome for the PLC and publish it. From here on it is final.
+
+    It stays in the journal until the station has noted it: the PLC may have taken it long before.
+    """
     state = work.state
     state.queue = (*state.queue, outcome)
+    work.update_journal(verdicts=(*state.journal.verdicts, outcome)[-MOST_UNNOTED:])
     work.count(_COUNTED[outcome.outcome], *(("count_late",) if outcome.late else ()))
     work.actions += [ForwardOutcome(outcome), NotifyPublished(outcome)]
     work.signals.append(Signal.QUEUED)
@@ -69,7 +73,7 @@ def queue(work: Work, outcome: Outcome) -> None:
 
 def publish_own(work: Work, outcome: Outcome) -> None:
     """Publish the interface's own outcome; it survives a restart, until the station has noted it."""
-    work.update_journal(verdicts=(*work.state.journal.verdicts, outcome)[-MOST_OWN_OUTCOMES:])
+    work.durable = True
     queue(work, outcome)
 
 
@@ -77,8 +81,9 @@ def hide(work: Work, outcome: Outcome) -> None:
     """Close an inspection whose trigger was refused: NO_RESULT for the station, nothing for the PLC."""
     journal = work.state.journal
     work.log(f"inspection {outcome.sequence} belongs to a trigger that was refused: it is called off")
+    work.durable = True
     work.update_journal(
-        verdicts=(*journal.verdicts, outcome)[-MOST_OWN_OUTCOMES:], hidden=(*journal.hidden, outcome.sequence)
+        verdicts=(*journal.verdicts, outcome)[-MOST_UNNOTED:], hidden=(*journal.hidden, outcome.sequence)
     )
     work.actions.append(NotifyPublished(outcome))
     pass_over_hidden(work)

@@ -24,6 +24,8 @@ class Work:
     settings: HandshakeSettings
     actions: list[Action] = field(default_factory=list)
     signals: deque[Signal] = field(default_factory=deque)
+    durable: bool = False
+    """Whether the journal holds news that nobody else has, and that has to outlive a loss of power."""
     found: Outcome | None = None
     """The outcome that the signal OUTCOME or FOREIGN_OUTCOME is about."""
     size: Size = NO_SIZE

@@ -330,6 +330,21 @@ def test_what_the_plc_acknowledged_while_the_station_was_lost_is_told_also_while
     assert told[-1] == do.NotifyAcknowledged(41)
 
 
+def test_an_outcome_acknowledged_before_the_station_noted_it_is_told_again_after_its_restart(bench):
+    made = bench()
+    made.run()
+    made.feed(ev.OutcomeReceived, made.outcome())
+    (shown,) = made.state.queue
+    made.write("enable", acknowledged_sequence=41)
+    made.feed(ev.RequestFailed, "the note was lost")
+    made.actions.clear()
+    made.link(Open(running=None, outcomes=(made.outcome("NO_RESULT", Reason.STATION_LOST),)))
+    told = [action.outcome for action in made.actions if isinstance(action, do.NotifyPublished)]
+    assert told == [shown]
+    made.feed(ev.OutcomeNoted, 41)
+    assert made.state.journal.verdicts == ()
+
+
 def status(made):
     word = view(made.state)["status"]
     assert isinstance(word, int)
