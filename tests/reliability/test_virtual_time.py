@@ -1,0 +1,95 @@
+"""A thousand triggers in virtual time: every law holds, and one that is broken on purpose is found and shrunk."""
+
+import logging
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+
+from benchmarks.virtual import interface, laws
+from benchmarks.virtual import station as virtual_station
+from benchmarks.virtual.play import play
+from benchmarks.virtual.story import Story, Trouble, draw, shrink
+from plc_interface.handshake.journal import Journal
+from station.inspection.cycle import TABLE, UNJUDGED, Action, Event, Transition
+from station.inspection.judge import Judgement
+from station.inspection.press import Press
+
+FRUITS, STORIES = 50, 20
+BUSY = Story(
+    seed=0,
+    fruits=12,
+    troubles=(
+        Trouble("camera", "slow", 3.0, 1.0),
+        Trouble("arm", "protective_stop", 8.0, 2.5),
+        Trouble("disk", "slow", 12.0, 2.0),
+        Trouble("gripper", "delayed", 16.0, 2.0),
+        Trouble("interface", "kill", 22.0, 1.0),
+    ),
+    carries=False,
+)
+
+
+@pytest.fixture(autouse=True)
+def quiet() -> Iterator[None]:
+    logging.disable(logging.CRITICAL)
+    yield
+    logging.disable(logging.NOTSET)
+
+
+def test_laws_hold_over_a_thousand_triggers():
+    triggers = 0
+    for seed in range(STORIES):
+        report = play(draw(seed, FRUITS))
+        assert report.broken is None, f"story {seed}: {report.broken}"
+        triggers += report.triggers
+    assert triggers >= STORIES * FRUITS
+
+
+def test_the_same_story_gives_the_same_play():
+    one, other = play(draw(7, FRUITS)), play(draw(7, FRUITS))
+    assert (one.decided, one.virtual_s, one.by_trouble) == (other.decided, other.virtual_s, other.by_trouble)
+
+
+def test_a_motion_that_no_stop_halts_is_found(monkeypatch: pytest.MonkeyPatch):
+    for state in UNJUDGED:
+        row = TABLE[state, Event.PROTECTIVE_STOP]
+        kept = tuple(action for action in row.actions if action is not Action.HALT)
+        monkeypatch.setitem(TABLE, (state, Event.PROTECTIVE_STOP), Transition(row.state, kept))
+    least = found(laws.NOTHING_MOVES)
+    assert len(least.troubles) <= 2
+    assert "arm protective_stop" in {trouble.name for trouble in least.troubles}
+
+
+def test_an_outcome_that_is_shown_again_is_found(monkeypatch: pytest.MonkeyPatch):
+    save = interface.Interface._save
+
+    def forgetful(self: interface.Interface, journal: Journal) -> None:
+        if len(journal.queue) >= len(self._machine.journal.queue):  # an acknowledgement is not written
+            save(self, journal)
+
+    monkeypatch.setattr(interface.Interface, "_save", forgetful)
+    least = found(laws.NONE_DOUBLED)
+    assert len(least.troubles) <= 2
+    assert "interface kill" in {trouble.name for trouble in least.troubles}
+
+
+def test_a_judge_that_passes_everything_is_found(monkeypatch: pytest.MonkeyPatch):
+    real = virtual_station.judged
+
+    def kind(press: Press) -> Judgement:
+        verdict = real(press)
+        return replace(verdict, outcome="PASS", findings=())
+
+    monkeypatch.setattr(virtual_station, "judged", kind)
+    assert found(laws.WHOLE_PRESS).troubles == ()
+
+
+def found(law: str) -> Story:
+    """The least story that breaks a law, from a busy one that does; its fruits come by the seed."""
+
+    def fails(story: Story) -> bool:
+        broken = play(story).broken
+        return broken is not None and broken.law == law
+
+    return shrink(next(story for seed in range(10) if fails(story := replace(BUSY, seed=seed))), fails)
