@@ -78,12 +78,16 @@ class Demo(NamedTuple):
 
 
 @contextlib.contextmanager
-def demo() -> Iterator[Demo]:
-    """A demonstration on addresses of its own, once it has inspected some fruit."""
+def demo(**settings: dict[str, Any]) -> Iterator[Demo]:
+    """A demonstration on addresses of its own, once it has inspected some fruit.
+
+    Args:
+        settings: by section, beside those of every demonstration here.
+    """
     modbus, metrics, hmi, camera, console = (free_port() for _ in range(5))
     with tempfile.TemporaryDirectory() as folder:
         file, log = Path(folder) / "station.yaml", Path(folder) / "demo.log"
-        values = {
+        values: dict[str, dict[str, Any]] = {
             "modbus": {"port": modbus},
             "metrics": {"port": metrics},
             "hmi": {"port": hmi, "refresh_s": REFRESH_S, "idle_s": 3600.0},
@@ -92,6 +96,7 @@ def demo() -> Iterator[Demo]:
             "camera": {"oldest_s": 2.0, "twin": {"port": camera}},
             "service": {"patience": 5.0, "inspection_deadline_s": 30.0},
         }
+        values = {name: {**values.get(name, {}), **settings.get(name, {})} for name in {*values, *settings}}
         file.write_text(json.dumps(values), encoding="utf-8")
         environment = {
             **os.environ, "STATION_HOME": folder, "STATION_CONFIG": str(file), "OMP_NUM_THREADS": "1", "COLUMNS": "200",
