@@ -98,7 +98,7 @@ def station(seconds: float) -> Iterator[tuple[Target, str]]:
         names = [HOST, "127.0.0.1", "localhost"]
         served = {"host": ANYWHERE, "readers": ["127.0.0.0/8", NETWORK], "writers": ["127.0.0.0/8", NETWORK]}
         running = stack.enter_context(
-            demo(modbus=served, metrics={"host": ANYWHERE}, hmi={"host": ANYWHERE, "names": names})
+            demo(1, modbus=served, metrics={"host": ANYWHERE}, hmi={"host": ANYWHERE, "names": names})
         )
         site, configuration = running.site, running.log.with_name("station.yaml")
         home = site.home / "demo"  # where a demonstration keeps what it has
@@ -123,8 +123,11 @@ class Bystander:
     def __init__(self, *arguments: object) -> None:
         command = [sys.executable, str(BYSTANDERS), *map(str, arguments)]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    def begun(self) -> None:
+        """Wait until it has begun."""
         if self._process.stdout is None or self._process.stdout.readline() != "begun\n":
-            raise SystemExit(f"{arguments[0]} did not begin")
+            raise SystemExit("a client beside the attack did not begin")
 
     def end(self) -> dict[str, Any]:
         """End it; return its results."""
@@ -171,6 +174,8 @@ def carried_out(attack: Attack, target: Target, endpoint: str) -> Row:
     name, pin = pages.PINS[Role.OPERATOR]
     client = Bystander("scan", target.modbus)
     panel = Bystander("panel", target.tls if attack.on == "tls" else target.pages, endpoint, name, pin)
+    client.begun()
+    panel.begun()
     sampled.start()
     try:
         found = attack.run(target)

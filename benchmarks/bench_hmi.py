@@ -78,10 +78,11 @@ class Demo(NamedTuple):
 
 
 @contextlib.contextmanager
-def demo(**settings: dict[str, Any]) -> Iterator[Demo]:
+def demo(first: int = FRUIT_FIRST, **settings: dict[str, Any]) -> Iterator[Demo]:
     """A demonstration on addresses of its own, once it has inspected some fruit.
 
     Args:
+        first: number of fruit to wait for.
         settings: by section, beside those of every demonstration here.
     """
     modbus, metrics, hmi, camera, console = (free_port() for _ in range(5))
@@ -106,7 +107,7 @@ def demo(**settings: dict[str, Any]) -> Iterator[Demo]:
             process = subprocess.Popen(command, stdout=output, stderr=output, env=environment)
         running = Demo(load_configuration(file, {"STATION_HOME": folder}), process, log, console)
         try:
-            until(lambda: running.fruit() >= FRUIT_FIRST or process.poll() is not None)
+            until(lambda: running.fruit() >= first or process.poll() is not None)
             if process.poll() is not None:
                 raise SystemExit(log.read_text(encoding="utf-8"))
             yield running

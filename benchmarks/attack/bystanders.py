@@ -32,11 +32,11 @@ REPLY_BYTES = 9 + 2 * 20
 TOKEN = re.compile(r'data-token="([^"]+)"')
 
 
-def until_told(once: Callable[[], None], period_s: float) -> None:
-    """Do something once a period until the input ends; a missed period is left out."""
+def until_told(once: Callable[[], None], period_s: float, enough: Callable[[], bool] = lambda: True) -> None:
+    """Do something once a period until the input has ended and it is enough; a missed period is left out."""
     due_s = time.monotonic()
     print("begun", flush=True)
-    while not select.select([sys.stdin], [], [], max(0.0, due_s - time.monotonic()))[0]:
+    while not (select.select([sys.stdin], [], [], max(0.0, due_s - time.monotonic()))[0] and enough()):
         once()
         due_s = max(due_s + period_s, time.monotonic())
 
@@ -138,33 +138,32 @@ async def _stopping(endpoint: str) -> bool:
 
 
 def panel(url: str, endpoint: str, name: str, pin: str) -> dict[str, list[float] | int]:
-    """Order *Stop*, see that the station stops, order *Start*."""
+    """Order *Stop* and see that the station stops, or *Start* where it is stopped, over and over."""
     person, stop_s, failed = Browser(url), list[float](), 0
     if person.post("/people/log-in", name=name, pin=pin) != 303:
         raise SystemExit("the panel cannot log in")
 
-    def ordered(order: str) -> float:
+    def stopped_s() -> float:
         began_s = time.monotonic()
-        if person.post("/order", order=order) != 303:
-            raise OSError(f"{order} is refused")
-        while asyncio.run(_stopping(endpoint)) != (order == "stop"):
+        if person.post("/order", order="stop") != 303:
+            raise OSError("*Stop* is refused")
+        while not asyncio.run(_stopping(endpoint)):
             if time.monotonic() > began_s + STOP_S:
-                raise OSError(f"{order} is not carried out")
+                raise OSError("*Stop* is not carried out")
         return time.monotonic() - began_s
 
     def once() -> None:
         nonlocal failed
         try:
-            stop_s.append(ordered("stop"))
+            if asyncio.run(_stopping(endpoint)):
+                person.post("/order", order="start")
+            else:
+                stop_s.append(stopped_s())
         except (OSError, HTTPException, ChannelError) as error:
             failed += 1
             print(f"panel: {error!r}", file=sys.stderr)
-        try:
-            ordered("start")
-        except (OSError, HTTPException, ChannelError) as error:
-            print(f"panel: {error!r}", file=sys.stderr)
 
-    until_told(once, PAUSE_S)
+    until_told(once, PAUSE_S, lambda: bool(stop_s or failed))
     return {"stop_s": stop_s, "failed": failed}
 
 

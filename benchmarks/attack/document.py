@@ -137,6 +137,6 @@ def _line(row: Row) -> str:
 
 
 def _commit() -> str:
-    command = ["git", "log", "-1", "--format=%h of %cs"]
+    command = ["git", "log", "-1", "--format=of %cs"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     return done.stdout.strip() or "unknown"
