@@ -97,7 +97,7 @@ def _streams(target: Target, sources: tuple[str, ...]) -> Found:
                 while time.monotonic() < until_s:
                     got += panel.recv(65_536)
     told = got.count(b"data: ")
-    seen = f"{kept} kept; the panel's stream told {told} times"
+    seen = f"{kept} kept; events on the panel's stream: {told}"
     return Found(STREAMS, seen, "" if told > 1 else "the panel's stream does not go on")
 
 
