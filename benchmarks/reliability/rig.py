@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 import urllib.error
 import urllib.request
 from collections.abc import AsyncIterator
@@ -21,7 +22,17 @@ from plc_interface.client import StationClient
 from plc_interface.client.errors import ClientError
 from plc_interface.plc_simulator.scan import Scanner
 from plc_interface.registers.codec import WordOrder
+from station.channel.client import ChannelClient
+from station.channel.panel import Actor
+from station.channel.panel_live import (
+    GetPanelState,
+    OperatorCommand,
+    OperatorCommandName,
+    OperatorCommandView,
+    PanelState,
+)
 from station.settings.configuration import Configuration, load_configuration
+from station.settings.hmi import panel_endpoint
 from station.settings.recipe import load_recipes
 from station.supervision.programs import station_programs, twin_program
 from station.supervision.supervisor import Supervisor
@@ -48,6 +59,7 @@ _SWEEPS_SLOWER = 2.0
 """A sweep takes 0.15 s, in which a busy machine neither sees the phase nor measures enough frames for a PASS."""
 _JAWS_OPEN_MM = 50.0
 _START_S = 120.0
+_STOP_S = 10.0
 
 
 class Rig:
@@ -206,6 +218,18 @@ class Rig:
         command = [sys.executable, "-m", "station", "devices", *remedy.split(), "--yes", "--config", str(self._file)]
         done = await asyncio.to_thread(subprocess.run, command, capture_output=True, timeout=90, check=False)
         return done.returncode == 0
+
+    async def stop_at_the_panel(self) -> bool:
+        """Stop the station as a person does. Whether the pages show it."""
+        endpoint = panel_endpoint(self.configuration.hmi, self.configuration.home)
+        order = OperatorCommand(person=Actor(who="bench", role="operator"), order=OperatorCommandName.STOP)
+        async with ChannelClient(endpoint, "the station") as panel:
+            await panel.request(order, OperatorCommandView, deadline_s=_STOP_S)
+            ends_s = time.monotonic() + _STOP_S
+            while time.monotonic() < ends_s:
+                if (await panel.request(GetPanelState(), PanelState, deadline_s=_STOP_S)).stopping:
+                    return True
+        return False
 
     async def choose_recipe(self) -> None:
         """Make the fruit's recipe the active one, then give the right to write away."""
