@@ -63,6 +63,8 @@ class Event(StrEnum):
     PROTECTIVE_STOP = "protective_stop"
     EMERGENCY_STOP = "emergency_stop"
     SAFETY_FAULT = "safety_fault"
+    PROGRAM_STOPPED = "program_stopped"
+    """A person stopped the arm's program on the pendant."""
     PERSON_CONFIRMED = "person_confirmed"
     """A person at the panel says that the cell is safe and the jaws are clear."""
     RECOVERED = "recovered"
@@ -169,6 +171,7 @@ REASONS: dict[Event, Reason] = {
     Event.PROTECTIVE_STOP: Reason.ARM_FAULT,
     Event.EMERGENCY_STOP: Reason.ARM_FAULT,
     Event.SAFETY_FAULT: Reason.ARM_FAULT,
+    Event.PROGRAM_STOPPED: Reason.ARM_FAULT,
 }
 """The outcome's reason where an event closes an inspection as NO_RESULT."""
 
@@ -205,6 +208,7 @@ LATCHES = {
     E.PROTECTIVE_STOP: AlarmId.PROTECTIVE_STOP,
     E.EMERGENCY_STOP: AlarmId.EMERGENCY_STOP,
     E.SAFETY_FAULT: AlarmId.SAFETY_FAULT,
+    E.PROGRAM_STOPPED: AlarmId.ARM_NOT_REMOTE,
 }
 _NO_RESULT = (A.HALT, A.CLOSE_AS_NO_RESULT, A.RECORD)
 _HOLD = (A.HALT, A.READ_DEVICES)

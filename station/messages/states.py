@@ -52,10 +52,12 @@ CARRIED = define(
     "state.carried",
     "A judged fruit may still be between the jaws: take it out, repair what the alarms say, then confirm at the panel.",
 )
-RECORDING_LATCHED = define("state.recording_latched", "A safety stop is active; NO_RESULT is stored.")
+RECORDING_LATCHED = define(
+    "state.recording_latched", "The arm was stopped by its safety system or a person; NO_RESULT is stored."
+)
 LATCHED = define(
     "state.latched",
-    "A safety stop is active: make the cell safe, repair its cause, take out what is between the jaws, then confirm at "
-    "the panel.",
+    "The arm was stopped by its safety system or a person: make the cell safe, repair the cause, take out what is "
+    "between the jaws, then confirm at the panel.",
 )
 RECOVERING = define("state.recovering", "The arm is recovered after a person's confirmation; wait a moment.")

@@ -41,6 +41,7 @@ WAYS: dict[str, tuple[tuple[Event, State], ...]] = {
     ),
     "stopped at once": ((E.EMERGENCY_STOP, S.LATCHED), *RECOVERED),
     "stopped while idle": (*TO_IDLE, (E.PROTECTIVE_STOP, S.LATCHED), *RECOVERED),
+    "stopped on the pendant": (*TO_IDLE, (E.PROGRAM_STOPPED, S.LATCHED), *RECOVERED),
     "stopped in an inspection": (
         *TO_FRUIT, (E.SAFETY_FAULT, S.RECORDING_LATCHED), (E.RECORDED, S.LATCHED), (E.PERSON_CONFIRMED, S.RECOVERING),
         (E.ARM_FAULT, S.LATCHED), *RECOVERED,

@@ -136,7 +136,7 @@ async def stop_at_the_panel(file):
 
 @pytest.mark.timeout(400)
 def test_what_only_a_person_may_end_outlives_kills_and_nothing_moves_meanwhile(cell):
-    """A fruit that the arm carries, a safety stop that is confirmed while nobody watches, a person's stop."""
+    """A fruit that the arm carries, a safety stop confirmed while nobody watches, stops on pendant and panel."""
 
     async def kill_while_carrying(service):
         async with cell.line() as line:
@@ -189,6 +189,15 @@ def test_what_only_a_person_may_end_outlives_kills_and_nothing_moves_meanwhile(c
     service.wait()
     cell.twin_is(do="clear", device="arm", fault="protective_stop")
     assert cell.recover("protective-stop") == 0
+    service = cell.service()
+    asyncio.run(is_held(PackmlState.ABORTED, states.LATCHED()))
+    asyncio.run(reset())
+
+    cell.twin_is(do="set", device="arm", fault="pendant_stop", amount=1.0)
+    asyncio.run(is_held(PackmlState.ABORTED, states.LATCHED()))
+    service.kill()
+    service.wait()
+    cell.twin_is(do="clear", device="arm", fault="pendant_stop")
     service = cell.service()
     asyncio.run(is_held(PackmlState.ABORTED, states.LATCHED()))
     asyncio.run(reset())
