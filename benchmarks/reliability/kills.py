@@ -123,6 +123,8 @@ class _Run:
             await self.rig.lay_and_trigger()
         if triggers:
             await _until(lambda: self._gone > 0, "the line gets no outcome")
+        if idle and triggers and self.wire.passages[-1].decision in _NOT_ACCEPTED:
+            await self._missed()
         self.held = await self._needs_person()
         if must_hold and not self.held:
             self.wrong.append(f"{must_hold} was forgotten")
@@ -154,22 +156,26 @@ class _Run:
         """Kill the process; what has to be held afterwards."""
         wire, plan = self.wire, self.plan
         self.state, shown = wire.packml, wire.ready
+        idle = plan.moment == "idle"
         judged = self._gone > 0 or wire.result_valid
         await self.rig.begin(ProcessFault(process=plan.process, signal="SIGKILL"))
-        self.killed, since_s = True, time.monotonic()
-        await asyncio.sleep(_OPENED_S)
+        self.killed = True
+        await asyncio.sleep(0.0 if idle else _OPENED_S)
         carried = (
             self.rig.configuration.service.placing == "arm"
             and plan.process == "service"
             and judged
             and not await self.rig.jaws_open()
         )
-        # A person's or a safety stop that was shown is never ready. Else the readiness that is read may be an old one.
-        while plan.moment != "idle" and plan.process != "hmi" and shown and wire.ready:
-            if time.monotonic() - since_s > _SHOWN_S:
-                break
-            await asyncio.sleep(_LOOK_S)
+        if shown and not idle and plan.process != "hmi":
+            await self._missed()
         return plan.stop or (FRUIT if carried or (self.state == "held" and "fruit_held" in wire.alarms) else "")
+
+    async def _missed(self) -> None:
+        """Wait until the killed process is missed: the readiness that is read may be from before the kill."""
+        since_s = time.monotonic()
+        while self.wire.ready and time.monotonic() - since_s < _SHOWN_S:
+            await asyncio.sleep(_LOOK_S)
 
     async def _needs_person(self) -> str:
         """What the station, once it answers again, waits for a person with; empty where it does not."""
