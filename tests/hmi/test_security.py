@@ -49,7 +49,10 @@ class TestRequests:
         assert " onclick" not in text
         assert 'src="http' not in text
 
-    HOSTS = ("127.0.0.1:80@evil", "127.0.0.1:", "127.0.0.1:80:80", "evil@127.0.0.1", "[127.0.0.1]x", "127.0.0.1 ")
+    HOSTS = (
+        *("127.0.0.1:80@evil", "127.0.0.1:", "127.0.0.1:80:80", "evil@127.0.0.1"),
+        *("[127.0.0.1]x", "[127.0.0.1]", "127.0.0.1 "),
+    )
 
     @pytest.mark.parametrize(
         "host", ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "", "[::2]", *HOSTS]
