@@ -49,7 +49,7 @@ MEANT: dict[str, tuple[str, ...]] = {
     # the PLC's command `call_off`
     "call off": ("station/commands/grip.py", "station/runtime/production/plc_commands.py"),
     "calm": ("docs/robust-constants.md",),  # the constant `calm_trust`
-    "damaged passed": ("docs/grr.md", "docs/sorting.md"),  # column headings of a result
+    "damaged passed": ("docs/grr.md",),  # column headings of a result
     "frame": ("plc_interface/server/exceptions.py", "plc_interface/server/mbap.py"),
     "gate": ("station/calibration/gate.py", "station/vision/robust.py"),  # the recipe's `gate_ratio`, the detail `gate`
     "look": (

@@ -73,5 +73,5 @@ def test_the_pages_are_killed_under_a_running_line(ready, panel):
     assert outcome.outcome in {"PASS", "FAIL"}, outcome
     viewer.page.locator(f"body:not([data-boot='{boot}'])").wait_for()
     viewer.page.locator("body:not(.stale)").wait_for()
-    viewer.until(".run-fruit .facts", f"Number\\s*{sequence}\\b")
+    viewer.page.locator(f".run-fruit a.fruit-more[href$='/{sequence}']").wait_for()
     assert ready.process("hmi").pid != killed.pid

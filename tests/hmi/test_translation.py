@@ -30,10 +30,15 @@ from station.vocabulary import Flag, PackmlState, Reason
 STATION = HMI.parent / "station"
 NO_PAGES = {
     "/live",
+    "/panel",  # sets a cookie and leads to the pages
     "/fruit/{sequence}/picture.svg",
     "/history/image/{sha256}.png",
     "/history/{sequence}/step/{step}/stage/{place}.jpg",
+    "/change/part",
+    "/change/{number}/part",
     "/maintenance/health/part",
+    "/maintenance/hand/part",
+    "/maintenance/support.zip",
     "/maintenance/image/part",
     "/maintenance/image/{place}.jpg",
     "/maintenance/registers/part",
@@ -47,7 +52,7 @@ NO_PAGES = {
     "/jobs/{job}/show/{name}",
 }
 """Parts of pages, pictures, streams and files."""
-IN_THEIR_OWN_TESTS = {"/alarms/{alarm}", "/jobs/{job}"}
+IN_THEIR_OWN_TESTS = {"/alarms/{alarm}", "/jobs/{job}", "/maintenance/configuration"}
 IN_TEMPLATES = re.compile(r"""\bt\(\s*["']([a-z_]+\.[a-zA-Z_.-]+)["'](?=\s*[,)])""")
 IN_CODE = re.compile(r"""(?:text\(|Problem\(\d+, |UserStoreError\()["']([a-z_]+\.[a-z_]+)["']""")
 
