@@ -84,10 +84,10 @@ def flood(target: Target) -> Found:
 def half_headers(target: Target) -> Found:
     """Three bytes of a header, and no more."""
     with crowd(target.modbus, HALF, STRANGERS, READ[:3]) as clients:
-        kept = still_open(clients)
+        at_start = still_open(clients)
         time.sleep(max(target.seconds, _FRAME_ENDS_S))
         left = still_open(clients)
-    return Found(HALF, f"{kept} kept at first, {left} at the end", f"{left} not ended" if left else "")
+    return Found(HALF, f"{at_start} open at first, {left} at the end", f"{left} not ended" if left else "")
 
 
 def drip(target: Target) -> Found:

@@ -89,7 +89,7 @@ def no_handshakes(target: Target) -> Found:
 
 def _streams(target: Target, sources: tuple[str, ...]) -> Found:
     with crowd(target.port_of(target.pages), STREAMS, sources, STREAM) as clients:
-        kept = still_open(clients)
+        at_start = still_open(clients)
         with crowd(target.port_of(target.pages), 1, (PANEL,), STREAM) as (panel,):
             panel.settimeout(3.0)
             until_s, got = time.monotonic() + max(3.0, target.seconds), b""
@@ -97,7 +97,7 @@ def _streams(target: Target, sources: tuple[str, ...]) -> Found:
                 while time.monotonic() < until_s:
                     got += panel.recv(65_536)
     told = got.count(b"data: ")
-    seen = f"{kept} kept; events on the panel's stream: {told}"
+    seen = f"{at_start} open; events on the panel's stream: {told}"
     return Found(STREAMS, seen, "" if told > 1 else "the panel's stream does not go on")
 
 
@@ -216,14 +216,14 @@ def large_bodies(target: Target) -> Found:
 def silent_metrics(target: Target) -> Found:
     """Silent connections to metrics and health; a monitor at the machine itself asks meanwhile."""
     with crowd(target.metrics, CROWD, STRANGERS) as clients:
-        kept = still_open(clients)
+        most = still_open(clients)
         statuses: Counter[int] = Counter()
         until_s, monitor = time.monotonic() + target.seconds, Browser(f"http://127.0.0.1:{target.metrics}", "127.0.0.1")
         while time.monotonic() < until_s:
             statuses[monitor.ask("GET", "/livez")[0]] += 1
             time.sleep(0.1)
         left = still_open(clients)
-    return Found(CROWD, f"{kept} kept at first, {left} at the end; /livez: {_counted(statuses)}", _only(statuses, 200))
+    return Found(CROWD, f"{most} open at first, {left} at the end; /livez: {_counted(statuses)}", _only(statuses, 200))
 
 
 ATTACKS = (

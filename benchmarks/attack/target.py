@@ -104,4 +104,4 @@ def silent(
     with crowd(port, count, sources, sent, context) as clients:
         at_once = still_open(clients)
         time.sleep(seconds)
-        return Found(count, f"{at_once} kept at first, {still_open(clients)} after {seconds:g} s")
+        return Found(count, f"{at_once} open at first, {still_open(clients)} after {seconds:g} s")
