@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 from sqlalchemy import Connection, Row, func, select
 
 from station.messages import records as messages
-from station.messages.message import message_in
 from station.records.database import reading
 from station.records.errors import RecordsError
 from station.records.schema import (
@@ -22,7 +21,7 @@ from station.records.schema import (
     outbox,
     recipe_snapshots,
 )
-from station.records.stored_message import FIRST_PRESS, JUDGEMENT, from_stored, to_stored
+from station.records.stored_message import FIRST_PRESS, JUDGEMENT, from_stored, images_state_of, to_stored
 from station.records.write_requests import OutboxKind
 
 LARGEST_BATCH = 500
@@ -184,7 +183,7 @@ def _inspection(row: Row[Any], curve: list[dict[str, Any]], kept: list[dict[str,
         "published": _time(row.published_utc_ms),
         "curve": curve,
         "images": kept,
-        "images_state": str(message_in(row.images_state) or ""),
+        "images_state": str(images_state_of(row.images_state) or ""),
     }
 
 

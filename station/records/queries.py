@@ -10,7 +10,6 @@ from sqlalchemy import Connection, func, select, true
 
 from station.channel.line import Outcome
 from station.messages import records as messages
-from station.messages.message import message_in
 from station.records.database import plain
 from station.records.errors import UnknownInspectionError
 from station.records.images import image_path
@@ -26,7 +25,7 @@ from station.records.model import (
     Trigger,
 )
 from station.records.schema import alarms, alarms_log, curve_points, images, inspections, recipe_snapshots
-from station.records.stored_message import FIRST_PRESS, JUDGEMENT, from_stored
+from station.records.stored_message import FIRST_PRESS, JUDGEMENT, from_stored, images_state_of
 
 
 class Summary(NamedTuple):
@@ -118,7 +117,7 @@ def read_inspection(connection: Connection, sequence: int, folder: Path) -> Full
             )
             for image in kept
         ),
-        images_state=message_in(row.images_state),
+        images_state=images_state_of(row.images_state),
     )
 
 

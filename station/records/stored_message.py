@@ -5,10 +5,30 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from station.messages.message import Message, verbatim
+from station.messages import records as messages
+from station.messages.message import Message, message_in, verbatim
 
 JUDGEMENT, FIRST_PRESS = "judgement", "first_press_findings"
 """Messages that are stored among an inspection's measures."""
+
+_IMAGES_BEFORE_MESSAGES = {
+    "kept": messages.IMAGES_KEPT(),
+    "pending": messages.IMAGES_PENDING(),
+    "not wanted": messages.IMAGES_NOT_WANTED(),
+    "removed: space for newer ones": messages.IMAGES_REMOVED(),
+    "lost: the station ended before they were written": messages.IMAGES_LOST(),
+    "none: known by its outcome alone": messages.IMAGES_NONE(),
+}
+"""The states of an inspection's images as versions before messages stored them."""
+
+
+def images_state_of(text: str) -> Message | None:
+    """Return the state of an inspection's images; None of one that runs.
+
+    Args:
+        text: as it is stored.
+    """
+    return _IMAGES_BEFORE_MESSAGES.get(text) or message_in(text)
 
 
 def to_stored(message: Message) -> dict[str, Any]:

@@ -15,6 +15,7 @@ import urllib.request
 import zipfile
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
+from http.client import HTTPException
 from importlib.metadata import distributions, version
 from pathlib import Path
 from typing import IO
@@ -56,7 +57,7 @@ def bundle(site: Configuration, target: Path | IO[bytes]) -> tuple[str, ...]:
 def _made(make: Callable[[], str | bytes]) -> str | bytes:
     try:
         return make()
-    except (StationError, OSError, ValueError) as error:
+    except (StationError, OSError, ValueError, HTTPException) as error:
         return f"not available: {error}\n"
 
 
@@ -97,7 +98,7 @@ def _packages() -> str:
 def _answer(site: Configuration, page: str) -> str:
     """Return what the running station answers; "not ready" is an answer too."""
     address = f"http://{site.metrics.host}:{site.metrics.port}/{page}"
-    opener = urllib.request.build_opener(_KeepError())
+    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}), _KeepError())
     with opener.open(address, timeout=_ANSWER_LIMIT_S) as answer:
         return answer.read().decode("utf-8", "replace")
 

@@ -19,19 +19,6 @@ ASSIGNS = {"SYMLINK", "GROUP", "MODE", "ATTR", "ENV", "TAG", "OWNER"}
 
 
 @pytest.fixture
-def tool():
-    """A program of systemd, or no test."""
-
-    def find(name: str) -> str:
-        path = shutil.which(name)
-        if path is None:
-            pytest.skip(f"{name} is missing on this machine")
-        return path
-
-    return find
-
-
-@pytest.fixture
 def booted(tmp_path, root) -> Path:
     """A root in which the units are, and what they start."""
     units = tmp_path / "etc/systemd/system"

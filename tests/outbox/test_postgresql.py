@@ -13,6 +13,7 @@ from pathlib import Path
 import psycopg
 import pytest
 
+from station.messages.records import IMAGES_KEPT, IMAGES_NOT_WANTED
 from station.outbox.errors import OutboxError
 from station.outbox.feed import read_batch
 from station.outbox.postgresql import Postgresql
@@ -101,7 +102,7 @@ def test_a_row_that_changed_is_told_again_and_is_there_once(server, fill, tmp_pa
         queue_event(connection, "inspection", 2)
     asyncio.run(tell_all(server, tmp_path, "changed"))
     found = rows(server, "SELECT sequence, images_state FROM inspections WHERE station = 'changed' ORDER BY sequence")
-    assert found == [(1, "not wanted"), (2, "kept")]
+    assert found == [(1, str(IMAGES_NOT_WANTED())), (2, str(IMAGES_KEPT()))]
 
 
 def test_what_no_database_can_hold_is_kept_apart_and_nothing_waits_behind_it(server, fill, tmp_path):

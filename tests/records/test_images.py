@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from station.messages import records as messages
+from station.messages.message import verbatim
 from station.records.images import ImageStore, accepted_is_stored
 from station.records.model import Image
 
@@ -225,3 +226,26 @@ def _pretend_pending(folder, sequence):
         connection.execute("DELETE FROM images WHERE sequence = ?", (sequence,))
         connection.execute("UPDATE inspections SET images_state = 'pending' WHERE sequence = ?", (sequence,))
     connection.close()
+
+
+@pytest.mark.parametrize(
+    ("stored", "state"),
+    [
+        ("kept", messages.IMAGES_KEPT()),
+        ("not wanted", messages.IMAGES_NOT_WANTED()),
+        ("dropped: the quota is full", verbatim("dropped: the quota is full")),
+        ("", None),
+    ],
+)
+def test_states_of_before_messages_read_the_same(opened, scenario, inspected, noise, settled, stored, state):
+    async def steps():
+        async with opened() as records:
+            number = await inspected(records, noise())
+            await settled(records)
+            connection = sqlite3.connect(records.folder / "records.sqlite3")
+            with connection:
+                connection.execute("UPDATE inspections SET images_state = ? WHERE sequence = ?", (stored, number))
+            connection.close()
+            assert (await records.inspection(number)).images_state == state
+
+    scenario(steps)
