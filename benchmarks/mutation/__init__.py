@@ -1,0 +1,1 @@
+"""Mutation testing of the pure rooms: what a small change of their code breaks in their own tests."""
