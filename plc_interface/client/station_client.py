@@ -75,7 +75,7 @@ class StationClient(RegisterLink):
 
     async def scan(self) -> dict[str, Any]:
         """Read status, result block and alarms with one request, by register names."""
-        return await self.read_groups("status", "more_alarms")
+        return await self.read_groups("status", "more_status")
 
     async def status(self) -> frozenset[str]:
         """Return the names of the status bits that are set."""

@@ -6,6 +6,8 @@ from plc_interface.handshake.modes import Mode
 from plc_interface.handshake.table import REGIONS
 from plc_interface.handshake.work import Row
 
+Cells = tuple[str, str, str]
+"""A row's condition, effects and next mode."""
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "plc" / "handshake-table.md"
 _HEAD = """\
 # The handshake's table
@@ -14,7 +16,8 @@ _HEAD = """\
 
 Reference behind [the handshake](handshake.md): every mode and signal, generated from the code. The regions run in
 parallel. A signal goes to each region that lists it; of several rows for one mode and signal, the first whose condition
-is true applies. A pair that is in no row changes nothing, is counted and is logged.
+is true applies. Modes and signals that share a row behave alike. A row without an effect and a next mode lists what is
+expected and changes nothing; a pair that is in no row changes nothing, is counted and is logged.
 """
 
 
@@ -42,12 +45,23 @@ def _diagram(rows: tuple[Row, ...]) -> list[str]:
 
 
 def _table(rows: tuple[Row, ...]) -> list[str]:
-    lines = ["| mode | signal | if | does | next |", "|---|---|---|---|---|"]
+    """Return the table, with one row for all modes and signals that behave alike."""
+    behaviours: dict[tuple[Mode, str], list[Cells]] = {}
     for row in rows:
         guard = _phrase(row.guard.__doc__) if row.guard else ""
         effects = "; ".join(_phrase(effect.__doc__) for effect in row.effects)
-        after = "" if row.next is row.mode else row.next.value
-        lines.append(f"| {row.mode.value} | {row.signal.value} | {guard} | {effects} | {after} |")
+        after = "" if row.next is row.mode and not row.guard and not effects else row.next.value
+        behaviours.setdefault((row.mode, row.signal.value), []).append((guard, effects, after))
+    signals: dict[tuple[Mode, tuple[Cells, ...]], list[str]] = {}
+    for (mode, signal), behaviour in behaviours.items():
+        signals.setdefault((mode, tuple(behaviour)), []).append(signal)
+    modes: dict[tuple[tuple[str, ...], tuple[Cells, ...]], list[str]] = {}
+    for (mode, behaviour), names in signals.items():
+        modes.setdefault((tuple(names), behaviour), []).append(mode.value)
+    lines = ["| modes | signals | if | does | next |", "|---|---|---|---|---|"]
+    for (names, behaviour), where in modes.items():
+        for guard, effects, after in behaviour:
+            lines.append(f"| {', '.join(where)} | {', '.join(names)} | {guard} | {effects} | {after} |")
     return lines
 
 

@@ -15,7 +15,8 @@ Value = int | float | str | None
 STATION_LOST_CODE = 1000
 """In `error_code` while the station does not answer; its alarms have the numbers below."""
 
-_STATUS, _FLAGS, _REASONS = BY_NAME["status"], BY_NAME["result_flags"], BY_NAME["result_reasons"]
+_STATUS, _MORE_STATUS = BY_NAME["status"], BY_NAME["more_status"]
+_FLAGS, _REASONS = BY_NAME["result_flags"], BY_NAME["result_reasons"]
 _OUTCOMES, _REFUSALS = BY_NAME["result_outcome"], BY_NAME["last_refusal"]
 
 
@@ -59,6 +60,7 @@ def _status(state: State) -> dict[str, Value]:
         "waiting_results": len(state.queue),
         "error_code": station.error_code if station else STATION_LOST_CODE,
         **alarm_values(station.alarms if station else 0),
+        "more_status": _MORE_STATUS.flags(["enable_inhibited"] if state.arming is Arming.DISARMED else []),
         "last_refusal": _REFUSALS.code(state.last_refusal.value) if state.last_refusal else 0,
         "last_refused_trigger_id": state.last_refused_id,
         "latched_lot_checksum": lot_checksum(journal.lot),

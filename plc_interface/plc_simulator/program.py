@@ -24,8 +24,6 @@ ANSWER_LIMIT_S = 10.0
 """A trigger or command that is answered later is given up."""
 RESULT_MARGIN_S = 2.0
 """Added to the station's own deadline for a result."""
-LONGEST_SCAN_S = 0.9
-"""After a longer pause between scans the station may have disarmed for want of a heartbeat: from the claim again."""
 _LONGEST_RESULT_S = 120.0
 _FAULT_S = 1.5
 _FROZEN_S = 3.0
@@ -120,7 +118,7 @@ class LineProgram:
     def __init__(self, plan: FaultPlan | None = None, lot: str = "") -> None:
         self.stage = Stage.CLAIMING
         self._lot, self._lot_wanted = lot, False
-        self._ready = self._jaws_open = False
+        self._ready = self._jaws_open = self._inhibited = False
         self._recipe = self._command_sequence = 0
         self.counters = Counters()
         self._plan = plan or FaultPlan()
@@ -131,7 +129,6 @@ class LineProgram:
         self._heartbeat = 0
         self._station_heartbeat: int | float | str | None = None
         self._heard_s: float | None = None
-        self._scanned_s: float | None = None
         self._since_s = 0.0
         self._acknowledge = False
         self._playing_after: LineFault | None = None
@@ -173,9 +170,7 @@ class LineProgram:
             The control block to write.
         """
         self.cut_wanted = self._ready = self._jaws_open = False
-        stood_still = self._scanned_s is not None and now_s - self._scanned_s > LONGEST_SCAN_S
-        self._scanned_s = now_s
-        if inputs is None or stood_still or not self._alive(inputs, now_s):
+        if inputs is None or not self._alive(inputs, now_s):
             self._lose(now_s)
         else:
             self._step(inputs, now_s, recipe if fruit_in_nest else None)
@@ -194,6 +189,7 @@ class LineProgram:
 
     def _step(self, inputs: Values, now_s: float, recipe: int | None) -> None:
         status = BY_NAME["status"].names(int(inputs["status"]))
+        self._inhibited = "enable_inhibited" in BY_NAME["more_status"].names(int(inputs["more_status"]))
         self._ready = "trigger_ready" in status
         self._jaws_open = self._ready or not inputs["active_recipe"]  # without a recipe nothing was ever gripped
         if not {"writer_owned", "online"} <= status and self.stage is not Stage.CLAIMING:
@@ -383,7 +379,7 @@ class LineProgram:
         forgotten = fruit is not None and fruit.fault is LineFault.FORGOTTEN_TRIGGER
         left_up = self._playing_after is LineFault.FORGOTTEN_ACKNOWLEDGE
         bits = {
-            "enable": armed,
+            "enable": armed and not self._inhibited,
             "buffer_results": armed,
             "trigger": self.stage is Stage.TRIGGERING or (forgotten and self.stage is Stage.WAITING_FOR_RESULT),
             "acknowledge": self._acknowledge or (left_up and armed),

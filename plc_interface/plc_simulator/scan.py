@@ -9,12 +9,12 @@ from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.exceptions import ModbusException
 
 from plc_interface.registers.codec import RegisterValueError, WordOrder, decode, encode
-from plc_interface.registers.map import CONTROL, GROUP_BY_NAME, MORE_ALARMS, RESULT, STATUS
+from plc_interface.registers.map import CONTROL, GROUP_BY_NAME, MORE_STATUS, RESULT, STATUS
 from plc_interface.registers.register import Register
 
 ANSWER_LIMIT_S = 1.0
 logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # `trouble` holds its errors
-_READ = (*STATUS, *RESULT, *MORE_ALARMS)
+_READ = (*STATUS, *RESULT, *MORE_STATUS)
 _FIRST = GROUP_BY_NAME["status"].address
 
 

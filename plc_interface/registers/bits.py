@@ -47,6 +47,13 @@ STATUS_BITS = _bits(
     ("simulated", "A device of the station is simulated"),
 )
 
+MORE_STATUS_BITS = _bits(
+    (
+        "enable_inhibited",
+        "Enable has to be written 0 before it can arm: after a start, or a loss of the writer or its heartbeat",
+    ),
+)
+
 FLAG_BITS = _bits(
     ("pass", "The outcome is PASS"),
     ("area_valid", "Area and closing are measured values"),

@@ -16,6 +16,7 @@ from plc_interface.registers.bits import (
     CONTROL_BITS,
     FLAG_BITS,
     MORE_ALARM_BITS,
+    MORE_STATUS_BITS,
     OUTCOME_CODES,
     PACKML_MODE_CODES,
     PACKML_STATE_CODES,
@@ -128,10 +129,11 @@ RESULT = (
     _u32("result_sequence_end", 160, "As result_sequence, for who reads the size too: where they differ read again"),
 )  # fmt: skip
 
-MORE_ALARMS = (
+MORE_STATUS = (
     Register("alarms_33_to_64", 162, Kind.BITS32, RO, "", None, None, "Active alarms 33 to 64", bits=MORE_ALARM_BITS),
+    Register("more_status", 164, Kind.BITS, RO, "", None, None, "Further state", bits=MORE_STATUS_BITS),
 )
-"""Right behind the result, so that one read still gets everything for a scan."""
+"""Right behind the result, so that one read still gets everything for a scan; what has no place in the status block."""
 
 COUNTERS = (
     _u32("count_triggers", 200, "Triggers seen, accepted or refused"),
@@ -206,7 +208,7 @@ GROUPS = (
     Group("control", "Control block", CONTROL),
     Group("status", "Status block", STATUS),
     Group("result", "Result block", RESULT),
-    Group("more_alarms", "Further alarms", MORE_ALARMS),
+    Group("more_status", "Further status", MORE_STATUS),
     Group("counters", "Counters", COUNTERS),
     Group("identity", "Identity", IDENTITY),
 )

@@ -10,6 +10,9 @@ from plc_interface.server.peer import Peer
 
 _BUFFER_BYTES = 4 * LONGEST_FRAME
 """Taken from the kernel at one time. What a client sends beyond it waits there, so that others have their turn."""
+REQUESTS_PER_S, AT_ONCE_S = 1000, 0.25
+"""Of one connection, and how much of it at once. A PLC needs a few for each scan. Without a limit who requests most
+takes the whole core, at real-time priority, and leaves no time to the station and its pages."""
 
 
 class Connection(asyncio.BufferedProtocol):
@@ -24,6 +27,10 @@ class Connection(asyncio.BufferedProtocol):
         self._view = memoryview(self._buffer)
         self._filled = 0
         self._ended = False
+        self._spent_until_s = 0.0
+        """Time by which the requests so far are due at the permitted rate."""
+        self._waiting: asyncio.TimerHandle | None = None
+        """Until the next requests may be read."""
         self.peer: Peer | None = None
         """None before it is connected, and where it was not admitted."""
         self.heard_s = 0.0
@@ -90,6 +97,19 @@ class Connection(asyncio.BufferedProtocol):
             self.drop(Trouble.MALFORMED_FRAME, malformed)
             return
         self._keep(used, size)
+        self._spend(len(answers), now_s)
+
+    def _spend(self, requests: int, now_s: float) -> None:
+        """Read no more for a while where a client has sent more requests than it may."""
+        self._spent_until_s = max(self._spent_until_s, now_s) + requests / REQUESTS_PER_S
+        ahead_s = self._spent_until_s - now_s - AT_ONCE_S
+        if ahead_s > 0 and self._waiting is None and not self._ended:
+            self._transport.pause_reading()
+            self._waiting = asyncio.get_running_loop().call_later(ahead_s, self._end_wait)
+
+    def _end_wait(self) -> None:
+        self._waiting = None
+        self._read_on()
 
     def _keep(self, used: int, size: int) -> None:
         """Move an incomplete request to the front."""
@@ -113,12 +133,18 @@ class Connection(asyncio.BufferedProtocol):
     def resume_writing(self) -> None:
         """Go on reading."""
         self.stalled_since_s = None
-        if self.unfinished_since_s is not None:
+        self._read_on()
+
+    def _read_on(self) -> None:
+        if self._ended or self._waiting is not None or self.stalled_since_s is not None:
+            return
+        if self.unfinished_since_s is not None:  # its rest waited in the kernel, for our sake
             self.unfinished_since_s = self._manager.now_s()
-        if not self._ended:
-            self._transport.resume_reading()
+        self._transport.resume_reading()
 
     def _end(self, why: str) -> None:
         if not self._ended:
             self._ended = True
+            if self._waiting is not None:
+                self._waiting.cancel()
             self._manager.gone(self.peer, why)

@@ -20,6 +20,9 @@ from station.settings.modbus import ModbusSettings
 BACKLOG = 128
 """Connections that wait in the kernel to be taken."""
 
+UNTAKEN_BYTES = 64 * 1024
+"""Responses that the kernel keeps for a client that does not take them: soon it is seen, and a crowd costs little."""
+
 
 class ModbusServerError(StationError):
     """The server cannot be started."""
@@ -97,6 +100,8 @@ class ModbusServer:
             )
         except OSError as error:
             raise ModbusServerError(why_not(section, host, port, error)) from error
+        for listening in listener.sockets:  # who is accepted inherits it
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, UNTAKEN_BYTES)
         self._listeners.append(listener)
 
 

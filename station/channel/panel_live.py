@@ -152,6 +152,27 @@ class Counts(ChannelMessage):
     unjudged: int = 0
 
 
+class SetupView(ChannelMessage):
+    """Facts of a first set-up, beside the rest of `PanelState`."""
+
+    addresses: dict[str, str]
+    """As configured, of each device that the station has and of `plc`."""
+    poses_taught: bool
+    """False while the poses at the nest are the simulated arm's and the arm is another."""
+    joints_rad: tuple[float, ...] | None
+    """The arm's present joint positions, to a ten-thousandth; None where it does not report them."""
+    width_mm: float | None
+    """As `Health` has it."""
+    calibration: Message | None
+    """The calibration in force; None for none."""
+    zero_mm: float | None
+    """The error of the jaws' zero that it measured."""
+    has_reference: bool
+    """An image of the untouched gel is stored."""
+    ball_recipe: str
+    """Name of the calibration ball's recipe, which is no fruit."""
+
+
 class PanelState(ChannelMessage):
     """The operator's summary of the station."""
 
@@ -199,6 +220,7 @@ class PanelState(ChannelMessage):
     lot_counts: Counts
     deadline_s: float | None
     """The longest that an inspection may take by the active recipe and settings."""
+    setup: SetupView
 
 
 class GetRecent(ChannelMessage):

@@ -4,7 +4,6 @@ The documents of the cycle and of the alarms with the cycle's drawing; a test co
 """
 
 from collections.abc import Iterable
-from itertools import groupby
 from pathlib import Path
 
 from station.inspection.alarm_table import ALARMS, PRIORITIES, AlarmId, Priority
@@ -17,9 +16,10 @@ from station.inspection.alarms import (
     AlarmEvent,
     AlarmState,
 )
-from station.inspection.cycle import REASONS, START, TABLE, Act, Event, Raise
+from station.inspection.cycle import LATCHES, REASONS, START, TABLE, Act, Event, Raise
 from station.inspection.diagram import diagram
 from station.inspection.states import STATES, State
+from station.messages import states
 
 ROOT = Path(__file__).resolve().parents[2]
 MADE = "<!-- made by python -m station.inspection.export -->\n"
@@ -49,7 +49,7 @@ What tests prove by walking through everything that the table can lead to, with 
 ALARM = f"""# Alarms
 
 {MADE}
-An alarm asks an operator for an action (ISA-18.2). Its number is the PLC's error code, and its bit is set while it is
+An alarm requires an operator's action (ISA-18.2). Its number is the PLC's error code, and its bit is set while it is
 active: bit number - 1 of the register `alarms`, or for the numbers from 33 on bit number - 33 of `alarms_33_to_64`.
 """
 
@@ -73,16 +73,26 @@ def cycle_document() -> str:
     parts = [
         CYCLE,
         "## States\n",
-        _table(("state", "PackML", "a trigger is", "says", "the process may end here"), map(_state, STATES)),
+        (
+            "In the states that refuse a trigger as `busy`, the text ends with: "
+            f"{states.WAIT()} Where *may end* says yes, no inspection is under way and the process may end.\n"
+        ),
+        _table(("state", "PackML", "refuses a trigger as", "says", "may end"), map(_state, STATES)),
         "## Table\n",
         (
-            f"It begins in `{START.state}` with {_acts(START.actions)}. Events with the same effect share a row; where "
-            "the state stays as it is, no next state is named.\n"
+            f"It begins in `{START.state}` with {_acts(START.actions)}. What has the same effect shares a row; where "
+            "the state stays as it is, no next state is named. *Its alarm* is in the last table.\n"
         ),
-        *_transitions(),
-        "## Reasons\n",
+        _table(("states", "events", "next", "actions"), _transitions()),
+        "## Reasons and alarms of the disturbances\n",
         "An inspection that an event closes as NO_RESULT has the event's reason.\n",
-        _table(("event", "reason"), ((f"`{event}`", f"`{reason}`") for event, reason in REASONS.items())),
+        _table(
+            ("event", "reason", "its alarm"),
+            (
+                (f"`{event}`", f"`{reason}`", _alarm_link(LATCHES[event]) if event in LATCHES else "")
+                for event, reason in REASONS.items()
+            ),
+        ),
     ]
     return "\n".join(parts)
 
@@ -92,9 +102,9 @@ def alarms_document() -> str:
     parts = [
         ALARM,
         _table(
-            ("number", "alarm", "priority", "cause"),
+            ("number", "alarm", "priority"),
             (
-                (str(row.number), f"[`{alarm}`](#{_heading(alarm)})", row.priority.value, str(row.cause))
+                (str(row.number), f"[`{alarm}`](#{_heading(alarm)})", row.priority.value)
                 for alarm, row in ALARMS.items()
             ),
         ),
@@ -117,32 +127,42 @@ def alarms_document() -> str:
 
 def _state(state: State) -> tuple[str, ...]:
     facts = STATES[state]
-    trigger = "accepted" if facts.refusal is None else f"refused: `{facts.refusal}`"
+    trigger = "" if facts.refusal is None else f"`{facts.refusal}`"
     packml = "unknown" if facts.packml is None else facts.packml.value.upper()
-    return f"`{state}`", packml, trigger, str(facts.reason), "yes" if facts.may_exit else ""
+    says = str(facts.activity)
+    return f"`{state}`", packml, trigger, says, "yes" if facts.may_exit else ""
 
 
-def _transitions() -> Iterable[str]:
-    """A heading and a table for each state."""
-    for state, pairs in groupby(sorted(TABLE, key=lambda pair: list(State).index(pair[0])), key=lambda pair: pair[0]):
-        effects: dict[tuple[State, tuple[Act, ...]], list[Event]] = {}
-        for pair in sorted(pairs, key=lambda pair: list(Event).index(pair[1])):
-            effects.setdefault(TABLE[pair], []).append(pair[1])
-        yield f"### {state.value.replace('_', ' ')}\n"
-        yield _table(
-            ("event", "next", "actions"),
-            (
-                (", ".join(f"`{event}`" for event in events), "" if next_ == state else f"`{next_}`", _acts(actions))
-                for (next_, actions), events in effects.items()
-            ),
-        )
+def _transitions() -> Iterable[tuple[str, ...]]:
+    """A row for each effect, those of few states first."""
+    places: dict[tuple[Event, State | None, str], list[State]] = {}
+    for state, event in sorted(TABLE, key=lambda pair: list(State).index(pair[0])):
+        next_, actions = TABLE[state, event]
+        effect = (event, None if next_ == state else next_, _acts(actions, LATCHES.get(event)))
+        places.setdefault(effect, []).append(state)
+    events: dict[tuple[tuple[State, ...], State | None, str], list[Event]] = {}
+    for (event, next_, acts), where in places.items():
+        events.setdefault((tuple(where), next_, acts), []).append(event)
+    for (where, next_, acts), what in sorted(events.items(), key=lambda row: len(row[0][0])):
+        yield _code(where), _code(what), "" if next_ is None else f"`{next_}`", acts
 
 
-def _acts(actions: Iterable[Act]) -> str:
+def _code(names: Iterable[str]) -> str:
+    return ", ".join(f"`{name}`" for name in names)
+
+
+def _acts(actions: Iterable[Act], own: AlarmId | None = None) -> str:
+    """Actions in their order; the event's own alarm is not named again."""
     return ", ".join(
-        f"alarm [`{action.alarm}`](alarms.md#{_heading(action.alarm)})" if isinstance(action, Raise) else f"`{action}`"
+        ("its alarm" if action.alarm == own else f"alarm {_alarm_link(action.alarm)}")
+        if isinstance(action, Raise)
+        else f"`{action}`"
         for action in actions
     )
+
+
+def _alarm_link(alarm: AlarmId) -> str:
+    return f"[`{alarm}`](alarms.md#{_heading(alarm)})"
 
 
 def _priority(priority: Priority) -> tuple[str, ...]:
@@ -153,14 +173,7 @@ def _alarm(alarm: AlarmId) -> Iterable[str]:
     row = ALARMS[alarm]
     yield f"## {alarm.value.replace('_', ' ')}\n"
     yield f"Number {row.number}, {row.priority}{', latched' if row.latched else ''}.\n"
-    yield _table(
-        ("", ""),
-        (
-            ("cause", str(row.cause)),
-            ("consequence", str(row.consequence)),
-            ("action", str(row.action)),
-        ),
-    )
+    yield f"- Cause: {row.cause}\n- Consequence: {row.consequence}\n- Action: {row.action}\n"
 
 
 def _heading(alarm: AlarmId) -> str:

@@ -7,10 +7,10 @@ import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
 from plc_interface.registers.generate.structured_text import data_types, example, function_block
-from plc_interface.registers.map import BY_NAME, CONTROL, MORE_ALARMS, STATUS
+from plc_interface.registers.map import BY_NAME, CONTROL, MORE_STATUS, STATUS
 from tests.plc_interface.registers.generate.structured_text.conftest import Library
 
-FIRST, WORDS = STATUS[0].address, MORE_ALARMS[-1].end - STATUS[0].address
+FIRST, WORDS = STATUS[0].address, MORE_STATUS[-1].end - STATUS[0].address
 SCAN_S = 0.02
 
 

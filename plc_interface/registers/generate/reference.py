@@ -10,6 +10,8 @@ from plc_interface.registers.map import GROUPS, MAP_VERSION, REGISTERS, bit_addr
 from plc_interface.registers.register import Kind, Register
 
 HOLDING, INPUT = 400_001, 300_001
+FULL = {Kind.U16: (0, 2**16 - 1), Kind.U32: (0, 2**32 - 1), Kind.U64: (0, 2**64 - 1)}
+"""Limits that are the type's own."""
 COLUMNS = (
     "name", "pdu_address", "hexadecimal", "reference_4x", "reference_3x", "type", "words", "access", "unit", "low",
     "high", "invalid", "bits", "codes", "meaning",
@@ -19,8 +21,10 @@ _INTRODUCTION = """\
 Version {version}, checksum 0x{checksum:08X}: the registers `map_version` and `map_checksum`.
 [What the bits mean for the handshake](index.md); [the table as CSV](register-map.csv).
 
-- *PDU* is the address on the wire, from 0; 4xxxxx and 3xxxxx are the same register in one-based notation, read by
-  function codes 03 and 04 alike. Only the control block can be written.
+- *PDU* is the address on the wire, from 0; *4x* is the same register in one-based notation, and 3xxxxx too: function
+  codes 03 and 04 read alike. Only the control block can be written.
+- A type's number is its bits, of 16 in a register; a text's is its registers. A register without limits takes all
+  that its type can hold.
 - 32- and 64-bit values have their high word first unless the station is configured otherwise; the bytes in a register
   are big-endian. Texts are ASCII, the first character in the high byte, filled up with NUL.
 - A 16-bit register of flags can also be reached bit by bit: coil or discrete input = 16 times the PDU address + bit.
@@ -50,8 +54,8 @@ def markdown() -> str:
         lines += [
             f"## {group.title}",
             "",
-            "| PDU | hex | 4x / 3x | name | type | words | access | unit | from … to | meaning |",
-            "|---|---|---|---|---|---|---|---|---|---|",
+            "| PDU | 4x | name | type | unit | limits | meaning |",
+            "|---|---|---|---|---|---|---|",
             *(_row(register) for register in group.registers),
             "",
         ]
@@ -91,16 +95,14 @@ def table() -> str:
 def _row(register: Register) -> str:
     bounds = ""
     if register.low is not None and register.high is not None and not register.codes:
-        bounds = f"{_plain(register.low)} … {_plain(register.high)}"
-    access = "RW" if register.access.value == "read and write" else "RO"
+        limits = (register.low, register.high)
+        bounds = "" if limits == FULL.get(register.kind) else f"{_plain(register.low)} … {_plain(register.high)}"
+    kind = register.kind.value
     cells = (
         str(register.address),
-        f"0x{register.address:04X}",
-        f"{HOLDING + register.address} / {INPUT + register.address}",
+        str(HOLDING + register.address),
         f"`{register.name}`",
-        register.kind.value,
-        str(register.words),
-        access,
+        f"{kind}[{register.words}]" if register.kind is Kind.TEXT else kind,
         register.unit,
         bounds,
         register.meaning,
@@ -113,13 +115,12 @@ def _details(register: Register) -> Iterator[str]:
         yield from (f"### Bits of `{register.name}`", "")
         coils = register.kind is Kind.BITS
         yield from (
-            f"| bit | mask |{' coil |' if coils else ''} name | meaning |",
-            f"|---|---|{'---|' * coils}---|---|",
+            f"| bit |{' coil |' if coils else ''} name | meaning |",
+            f"|---|{'---|' * coils}---|---|",
         )
         for bit in register.bits:
             coil = f" {bit_address(register, bit.number)} |" if coils else ""
-            mask = f"0x{1 << bit.number:0{4 * register.words}X}"
-            yield f"| {bit.number} | {mask} |{coil} `{bit.name}` | {bit.meaning} |"
+            yield f"| {bit.number} |{coil} `{bit.name}` | {bit.meaning} |"
         yield ""
     if register.codes:
         yield from (f"### Codes of `{register.name}`", "", "| value | name | meaning |", "|---|---|---|")

@@ -12,7 +12,7 @@ from plc_interface.registers.map import BY_NAME, GROUP_BY_NAME, MAP_VERSION, map
 from plc_interface.registers.register import Kind, Register
 
 STATUS, RESULT, CONTROL = GROUP_BY_NAME["status"], GROUP_BY_NAME["result"], GROUP_BY_NAME["control"]
-MORE_ALARMS = GROUP_BY_NAME["more_alarms"]
+MORE_STATUS = GROUP_BY_NAME["more_status"]
 _TYPES = {
     Kind.U16: "UINT",
     Kind.I16: "INT",
@@ -22,7 +22,7 @@ _TYPES = {
     Kind.BITS32: "DWORD",
 }
 ARRAYS = {
-    "T_FruitStationRead": MORE_ALARMS.address + MORE_ALARMS.words - STATUS.address,
+    "T_FruitStationRead": MORE_STATUS.address + MORE_STATUS.words - STATUS.address,
     "T_FruitStationWrite": CONTROL.words,
     "T_FruitStationLot": BY_NAME["lot"].words,
 }
@@ -60,7 +60,7 @@ def members(registers: tuple[Register, ...]) -> Iterator[tuple[str, str, str]]:
 def data_types() -> str:
     """The file with the data types of status and result, and of the words read and written."""
     parts = [_head("Data types")]
-    status = (*STATUS.registers, *MORE_ALARMS.registers)
+    status = (*STATUS.registers, *MORE_STATUS.registers)
     for registers, name in ((status, "ST_FruitStationStatus"), (RESULT.registers, "ST_FruitStationResult")):
         rows = [f"    {member} : {kind}; (* {comment} *)" for member, kind, comment in members(registers)]
         parts.append("\n".join([f"TYPE {name} :", "STRUCT", *rows, "END_STRUCT;", "END_TYPE", ""]))
@@ -103,7 +103,7 @@ def _render(template: str, what: str) -> str:
     return environment.get_template(template).render(
         head=_head(what),
         first=STATUS.address,
-        last=MORE_ALARMS.address + MORE_ALARMS.words - 1,
+        last=MORE_STATUS.address + MORE_STATUS.words - 1,
         writes=CONTROL.words,
         lot_words=BY_NAME["lot"].words,
         control_bits=BY_NAME["control"].bits,
@@ -117,7 +117,7 @@ def _render(template: str, what: str) -> str:
 
 
 def _decoding() -> Iterator[str]:
-    for group, variable in ((STATUS, "status"), (RESULT, "seen"), (MORE_ALARMS, "status")):
+    for group, variable in ((STATUS, "status"), (RESULT, "seen"), (MORE_STATUS, "status")):
         for register in group.registers:
             yield from _decode(register, variable)
 

@@ -284,7 +284,7 @@ def test_a_map_of_the_same_version_may_have_more_than_the_client_knows_and_not_l
             async with StationClient(HOST, rig.port) as client:
                 await client.arm()
                 grown = await client.inspect(7)
-            read, end = rig.image.registers, BY_NAME["alarms_33_to_64"].address
+            read, end = rig.image.registers, BY_NAME["more_status"].address
 
             def older(address, count):
                 if address <= end < address + count:
@@ -292,7 +292,7 @@ def test_a_map_of_the_same_version_may_have_more_than_the_client_knows_and_not_l
                 return read(address, count)
 
             monkeypatch.setattr(rig.image, "registers", older)
-            with pytest.raises(ReferencesError, match="older map, without all registers 162 to 163: update"):
+            with pytest.raises(ReferencesError, match="older map, without all registers 162 to 164: update"):
                 await StationClient(HOST, rig.port).connect()
             return grown
 

@@ -7,7 +7,7 @@ from plc_interface.handshake import events as ev
 from plc_interface.handshake.document import DOCUMENT, document
 from plc_interface.handshake.journal import Journal
 from plc_interface.handshake.modes import Arming, Inspection, Link, Result, Signal, Trigger
-from plc_interface.handshake.state import Fault
+from plc_interface.handshake.state import Fault, restarted
 from plc_interface.handshake.table import REGIONS
 from plc_interface.handshake.view import line, result_values, view
 from plc_interface.registers.map import BY_NAME
@@ -292,8 +292,12 @@ def test_an_enable_left_high_over_a_loss_never_arms_again(bench, lost):
         made.write("enable", "trigger", trigger_id=trigger_id)
         assert (made.state.last_refusal, made.state.last_refused_id) == (Refusal.NOT_ENABLED, trigger_id)
     assert made.of(do.RequestBegin) == []
-    made.write()
-    made.write("enable")
+    inhibited = BY_NAME["more_status"].flags(["enable_inhibited"])
+    seen = [view(made.state)["more_status"]]
+    for bits in ((), ("enable",)):
+        made.write(*bits)
+        seen.append(view(made.state)["more_status"])
+    assert seen == [inhibited, 0, 0]
     assert made.state.arming is Arming.ARMED
 
 
@@ -420,3 +424,21 @@ def test_a_plc_back_with_its_bit_high_after_the_answer_came_has_to_take_it_back(
     made.feed(ev.Tick)
     assert made.state.trigger is Trigger.STUCK
     assert Fault.TRIGGER_NOT_RESET in made.state.faults
+
+
+def test_a_command_while_another_is_executed_is_a_fault_and_begins_nothing(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "execute_command", command_code=1, command_sequence=5)
+    made.write("enable")
+    made.write("enable", "execute_command", command_code=1, command_sequence=6)
+    assert made.state.faults == (Fault.COMMAND_BUSY,)
+    assert len(made.of(do.RequestCommand)) == 1
+
+
+def test_an_inspection_that_ran_before_a_restart_began_as_long_ago_as_it_did(bench):
+    made = bench()
+    made.run()
+    again = restarted(made.state.journal, ev.Moment(5.0, made.at().utc_ms + 3000), 2.0)
+    assert again.running is not None
+    assert again.running.began_s == pytest.approx(2.0)

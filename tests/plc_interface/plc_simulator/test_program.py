@@ -10,12 +10,11 @@ from plc_interface.plc_simulator.faults import FaultPlan, LineFault
 from plc_interface.plc_simulator.program import (
     ANSWER_LIMIT_S,
     HEARTBEAT_LIMIT_S,
-    LONGEST_SCAN_S,
     Decision,
     LineProgram,
     Stage,
 )
-from plc_interface.registers.map import BY_NAME, RESULT, STATUS
+from plc_interface.registers.map import BY_NAME, MORE_STATUS, RESULT, STATUS
 
 SCAN_S = 0.1
 
@@ -25,7 +24,7 @@ class Station:
 
     def __init__(self, outcome="PASS"):
         self.outcome, self.next_sequence, self.heartbeat = outcome, 40, 0
-        self.values: dict[str, Any] = {register.name: 0 for register in (*STATUS, *RESULT)}
+        self.values: dict[str, Any] = {register.name: 0 for register in (*STATUS, *RESULT, *MORE_STATUS)}
         self.values |= {"result_area_mm2": math.nan, "active_recipe": 1, "result_deadline_ms": 5000}
         self.bits = {"online", "trigger_ready"}
         self.results, self.up, self.accepted = [], frozenset(), []
@@ -264,12 +263,18 @@ def test_every_fault_is_played_and_every_fruit_is_still_decided_once(fault):
     assert line.cuts == (3 if fault is LineFault.RECONNECT else 0)
 
 
-def test_a_scan_that_stood_still_arms_anew_as_the_station_has_disarmed_meanwhile():
+def test_enable_falls_while_the_station_inhibits_it_and_rises_again():
     station = Station()
     line = Line(station)
     line.until(lambda: line.program.free)
-    line.now_s += LONGEST_SCAN_S + SCAN_S
     line.scan()
-    assert "enable" not in station.up
-    line.until(lambda: line.program.free)
-    assert "enable" in station.up
+    assert "enable" in line.bits
+    station.values["more_status"] = BY_NAME["more_status"].flags(["enable_inhibited"])
+    line.scan()
+    line.scan()
+    assert "enable" not in line.bits
+    station.values["more_status"] = 0
+    line.scan()
+    line.scan()
+    assert "enable" in line.bits
+    assert line.program.counters.losses == 0

@@ -24,7 +24,7 @@ def test_a_fruit_from_enable_to_acknowledge(cell, eventually, order):
             assert {"online", "inspecting", "acquiring", "simulated", "writer_owned"} <= seen["status"]
             assert (seen["accepted_trigger_id"], seen["packml_state"], seen["active_recipe"]) == (4711, "execute", 3)
             assert seen["alarms"] == {"alarm_1", "alarm_3"}
-            assert (await plc.group("more_alarms"))["alarms_33_to_64"] == {"alarm_33", "alarm_64"}
+            assert (await plc.group("more_status"))["alarms_33_to_64"] == {"alarm_33", "alarm_64"}
             assert seen["result_deadline_ms"] == 60_300
             station.finish("FAIL", Reason.AREA_OVER_LIMIT, Reason.EARLY_STOP)
             first = await plc.wait("result_valid", without="inspecting")

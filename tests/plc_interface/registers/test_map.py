@@ -29,7 +29,7 @@ def test_a_block_has_no_gap_so_that_it_can_be_read_as_one(group):
 
 
 def test_one_scan_is_one_request():
-    status, result, alarms = (GROUP_BY_NAME[name] for name in ("status", "result", "more_alarms"))
+    status, result, alarms = (GROUP_BY_NAME[name] for name in ("status", "result", "more_status"))
     assert status.address + status.words == result.address
     assert result.address + result.words == alarms.address
     assert status.words + result.words + alarms.words <= LARGEST_READ

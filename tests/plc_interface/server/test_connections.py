@@ -3,10 +3,12 @@
 import contextlib
 import socket
 import struct
+import time
 
 import pytest
 
 from plc_interface.registers.map import BY_NAME
+from plc_interface.server.connection import REQUESTS_PER_S
 from plc_interface.server.connection_manager import RESERVED_PLACES
 from plc_interface.server.exceptions import Trouble
 
@@ -183,13 +185,34 @@ class TestTime:
         serving.wait(lambda: serving.server.connections == 1)
         assert serving.call(servers_end.fileno) == -1, "it does not wait for them to be taken"
 
-    def test_a_client_that_shouts_waits_for_its_turn(self, serve, connect):
+    def test_a_client_that_shouts_waits_for_its_turn(self, serve, connect, monkeypatch):
+        monkeypatch.setattr("plc_interface.server.connection.REQUESTS_PER_S", 50)
         serving = serve()
         loud, plc = connect(serving, "127.0.0.9"), connect(serving)
-        count = 2000
+        count = 200
+        began_s = time.monotonic()
         loud.send(loud.request(READ) * count)
-        assert plc.ask(READ) == GOOD
+        for _ in range(10):
+            assert plc.ask(READ) == GOOD
         assert [loud.receive()[2] for _ in range(count)] == [GOOD] * count
+        assert time.monotonic() - began_s > 3.0, (
+            "of four seconds at this rate, but for what is read and permitted at once"
+        )
+
+    def test_a_client_that_shouts_and_takes_nothing_ends(self, serve, connect, eventually):
+        serving = serve(frame_timeout_s=0.5)
+        deaf = connect(serving, "127.0.0.9")
+        deaf.socket.setblocking(False)
+        request, sent = deaf.request(struct.pack(">BHH", 3, 128, 30)), 0
+
+        def shout():
+            nonlocal sent
+            with contextlib.suppress(OSError):
+                sent += deaf.socket.send((request * 500)[sent % len(request) :])
+            return serving.server.statistics.troubles[Trouble.SLOW_READER]
+
+        eventually(shout)
+        assert serving.server.statistics.requests < 20 * REQUESTS_PER_S
 
 
 def test_stopping_parts_from_everybody_and_frees_the_port(serve, connect):

@@ -589,7 +589,7 @@ def test_the_handshake_keeps_its_promises_whatever_comes(station_model, laws):
     run_state_machine_as_test(
         lambda: Handshake(station_model, laws),  # type: ignore[arg-type]
         settings=settings(
-            max_examples=80,
+            max_examples=settings().max_examples * 4 // 5,
             stateful_step_count=40,
             suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large],
         ),

@@ -158,6 +158,17 @@ def test_a_change_of_recipe(plc):
     assert (plc.block["recipe_busy"], plc.block["recipe_done"]) == (False, True)
 
 
+def test_enable_falls_while_the_station_inhibits_it(plc):
+    plc.scan(3)
+    assert plc.control() == {"enable"}
+    plc.station.set(more_status=BY_NAME["more_status"].flags(["enable_inhibited"]))
+    plc.scan(2)
+    assert plc.control() == frozenset()
+    plc.station.set(more_status=0)
+    plc.scan()
+    assert plc.control() == {"enable"}
+
+
 def test_a_lot_goes_over_as_it_is(plc):
     plc.scan(3, lot=[0x4C31, *[0] * 15], latch_lot=True)
     assert plc.written("lot") == "L1"

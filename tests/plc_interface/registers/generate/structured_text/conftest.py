@@ -16,7 +16,7 @@ from blark.parse import parse_source_code
 
 from plc_interface.registers.codec import WordOrder, decode, encode
 from plc_interface.registers.generate.structured_text import data_types, example, function_block
-from plc_interface.registers.map import BY_NAME, CONTROL, MORE_ALARMS, STATUS
+from plc_interface.registers.map import BY_NAME, CONTROL, MORE_STATUS, STATUS
 
 tree: Any = transform
 """Its classes are made by decorators that hide their fields from the type checker."""
@@ -354,7 +354,7 @@ class Station:
 
     def __init__(self, order: WordOrder = WordOrder.HIGH_FIRST) -> None:
         self.order = order
-        self.words = [0] * (MORE_ALARMS[-1].end - STATUS[0].address)
+        self.words = [0] * (MORE_STATUS[-1].end - STATUS[0].address)
         self.beating = True
         self.flags("online", "trigger_ready")
 

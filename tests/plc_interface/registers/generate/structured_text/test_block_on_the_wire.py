@@ -6,8 +6,9 @@ import time
 import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
+from plc_interface.handshake.modes import Arming
 from plc_interface.registers.codec import WordOrder
-from plc_interface.registers.map import GROUP_BY_NAME, MORE_ALARMS, STATUS
+from plc_interface.registers.map import GROUP_BY_NAME, MORE_STATUS, STATUS
 from station.channel.line import Reason, Refusal
 
 SCAN_S = 0.01
@@ -19,7 +20,7 @@ class Loop:
 
     def __init__(self, plc, client):
         self.plc, self.client = plc, client
-        self.read = STATUS[0].address, MORE_ALARMS[-1].end - STATUS[0].address
+        self.read = STATUS[0].address, MORE_STATUS[-1].end - STATUS[0].address
 
     async def scan(self, **inputs):
         plc = self.plc
@@ -94,5 +95,34 @@ def test_fruits_recipe_refusal_and_a_station_that_dies(serve, make_plc, no_conta
                 assert not block["passed"]
             client.close()
             assert rig.state.queue == ()
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize("loss", ["connection", "heartbeat"])
+def test_a_loss_that_no_scan_has_seen_arms_again_with_enable_held(serve, make_plc, loss):
+    async def main():
+        plc = make_plc(WordOrder.HIGH_FIRST)
+        async with serve() as rig:
+            client = AsyncModbusTcpClient("127.0.0.1", port=rig.port, retries=0, reconnect_delay=0)
+            assert await client.connect()
+            loop = Loop(plc, client)
+            plc.inputs.update(accept_simulated=True, heartbeat_timeout=10.0)
+            plc.block({**plc.inputs, "connected": False})
+            await loop.until("ready", inspect=False)
+            if loss == "connection":
+                client.close()
+            async with asyncio.timeout(DEADLINE_S):
+                while rig.state.arming is not Arming.DISARMED:
+                    await asyncio.sleep(SCAN_S)
+            if loss == "connection":
+                assert await client.connect()
+            await loop.scan()
+            assert not plc.block["ready"]
+            assert plc.block["alive"]
+            await loop.until("ready")
+            await loop.until("done", inspect=True, fruit_id=7)
+            assert plc.block["passed"]
+            client.close()
 
     asyncio.run(main())

@@ -38,7 +38,7 @@ def test_names_differ_also_where_case_does_not_count(library):
 
 def test_the_block_reads_and_writes_the_maps_blocks(library):
     kinds = library.unit("FB_FruitStation").kinds
-    read = [GROUP_BY_NAME[name].words for name in ("status", "result", "more_alarms")]
+    read = [GROUP_BY_NAME[name].words for name in ("status", "result", "more_status")]
     lengths = {name: library.arrays[kinds[name]].length for name in ("station", "registers", "lot")}
     assert lengths == {
         "station": sum(read), "registers": GROUP_BY_NAME["control"].words, "lot": BY_NAME["lot"].words,
