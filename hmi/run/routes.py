@@ -77,11 +77,16 @@ def _buttons_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
 
 
 def _fruit(gateway: Gateway) -> object:
-    return gateway.last
+    return gateway.last, _never_inspected(gateway)
 
 
 def _fruit_values(gateway: Gateway, locale: Locale) -> Mapping[str, Any]:
-    return {**fruit_values(gateway.last, locale), "on_run": True}
+    return {**fruit_values(gateway.last, locale), "on_run": True, "never_inspected": _never_inspected(gateway)}
+
+
+def _never_inspected(gateway: Gateway) -> bool:
+    """Return whether the station's records have no fruit: its set-up is not finished."""
+    return gateway.state is not None and gateway.state.last_sequence is None
 
 
 def _figures(gateway: Gateway) -> object:

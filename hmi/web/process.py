@@ -1,6 +1,7 @@
 """HMI process: serves the pages until SIGINT or SIGTERM."""
 
 import asyncio
+import gc
 import logging
 import signal
 import ssl
@@ -55,6 +56,8 @@ async def serve(site: Configuration, file: Path | None) -> None:
         if not site.hmi.tls.enabled and not site.hmi.host.startswith(LOOPBACK):
             log.warning("the pages are served on %s without TLS: PINs can be read on the network", site.hmi.host)
         log.info("the pages are served on %s", address_of(site.hmi))
+        gc.collect()
+        gc.freeze()  # so that later collections are short
         feeding = asyncio.create_task(feed_watchdog(lambda: True), name="watchdog")
         notify("READY=1")
         waiting = asyncio.create_task(ended.wait(), name="order to end")

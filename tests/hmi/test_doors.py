@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 from urllib.parse import urlencode, urlsplit
 
+import psutil
 import pytest
 
 from station.inspection.alarm_table import AlarmId
@@ -19,6 +20,8 @@ from tests.hmi.conftest import OPERATOR, OPERATOR_PIN, PATIENCE_S, Cell
 CROWD = 250
 STRANGER, NEIGHBOUR = "127.0.0.9", "127.0.0.1"
 """An address of its own, and the panel's."""
+MOST_KEPT = 16_000_000
+"""Bytes; each of a thousand connections had up to 0.4 MB."""
 HEADER = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 BODY = b"POST /language HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 900\r\n\r\ncsrf="
 STREAM = b"GET /live?part=frame.state HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
@@ -96,6 +99,12 @@ def flood_of(cell: Cell) -> object:
     return details[0].parameters["address"] if details and details[0] else None
 
 
+def serving(port: int | None) -> psutil.Process:
+    """The process that serves a port; the cell's are no children of ours."""
+    listening = [one for one in psutil.net_connections("tcp") if one.status == psutil.CONN_LISTEN]
+    return psutil.Process(next(one.pid for one in listening if one.laddr and one.laddr.port == port))
+
+
 @pytest.mark.timeout(240)
 @pytest.mark.parametrize(
     ("sent", "source"),
@@ -125,6 +134,8 @@ def test_clients_of_tls_that_never_ask_close_the_pages_to_nobody(
     trusting = ssl.create_default_context(cafile=certificate["STATION_HMI_TLS_CERTIFICATE"])
     person, viewer = Visitor(address, trusting), Visitor(address, trusting)
     person.log_in()
+    process = serving(urlsplit(address).port)
+    memory = process.memory_info().rss
     clients = crowd(address, CROWD, STRANGER, context=trusting if shaken else None)
     assert viewer.ask("GET", "/")[0] == 200
     stop_and_start(people, person)
@@ -143,6 +154,10 @@ def test_clients_of_tls_that_never_ask_close_the_pages_to_nobody(
 
     eventually(ended, 30)
     stop_and_start(people, person)
+    for source in "127.0.0.10", "127.0.0.11", "127.0.0.12":
+        for client in crowd(address, CROWD, source, context=trusting if shaken else None):
+            client.close()
+    eventually(lambda: process.memory_info().rss < memory + MOST_KEPT, 10)
 
 
 @pytest.mark.timeout(240)

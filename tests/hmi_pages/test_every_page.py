@@ -28,6 +28,8 @@ PAGES = (
     "/maintenance/registers",
     "/maintenance/log",
 )
+SET_UP = "/maintenance/setup"
+"""For administrators alone."""
 OVERFLOW = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
 
 
@@ -35,7 +37,7 @@ def edit(page: Page, field: str, value: str) -> None:
     page.locator(f'[name="v:{field}"]').fill(value)
 
 
-@pytest.mark.parametrize("path", PAGES)
+@pytest.mark.parametrize("path", [*PAGES, SET_UP])
 def test_a_page_fits_both_screens_and_is_accessible(orchard: Any, panel: Any, path: str) -> None:
     person = panel("Ada")
     page = person.go(path.replace("SOFT", str(orchard.soft.sequence)))

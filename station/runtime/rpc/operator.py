@@ -42,6 +42,8 @@ from station.runtime.production.production import Production
 from station.runtime.recipes.active import ActiveRecipe
 from station.runtime.rpc.recent_inspections import RecentInspections
 from station.runtime.rpc.restored_inspections import read_recent
+from station.runtime.rpc.setup import setup_view
+from station.settings.configuration import Configuration
 from station.vocabulary import Refusal
 
 log = logging.getLogger(__name__)
@@ -55,6 +57,7 @@ class PanelServer:
     """Channel server for the HMI.
 
     Args:
+        configuration: in force.
         production: what is shown and commanded.
         records: gets lots; read for alarms.
         alarms: alarm commands of people.
@@ -63,11 +66,13 @@ class PanelServer:
 
     def __init__(
         self,
+        configuration: Configuration,
         production: Production,
         records: Records,
         alarms: AlarmCommands,
         audit: AuditLogger,
     ) -> None:
+        self._configuration = configuration
         self._interlock, self._service, self._devices = production.interlock, production.service, production.devices
         self._lots, self._book, self._plc_commands = production.lots, production.recipes, production.plc_commands
         self._records, self._alarms, self._audit = records, alarms, audit
@@ -153,6 +158,7 @@ class PanelServer:
             last_sequence=self._inspections.last_sequence,
             lot_counts=self._inspections.counts(self._lots.lot),
             deadline_s=None if active is None else service.pacing.limits(active.recipe).inspection_s,
+            setup=setup_view(self._configuration, self._devices),
         )
 
     async def _recent(self, request: GetRecent) -> Recent:

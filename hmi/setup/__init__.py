@@ -1,0 +1,1 @@
+"""Page Set-up, a part of Maintenance."""
