@@ -127,7 +127,7 @@ class Station:
         interlock = Interlock(service, devices, orders, book, lots, observability)
         production = Production(service, devices, book, lots, orders, interlock)
         alarm_orders = AlarmCommands(alarms, audit)
-        panel = PanelServer(production, records, alarm_orders, audit)
+        panel = PanelServer(configuration, production, records, alarm_orders, audit)
         health = HealthServer(
             configuration.metrics.host, configuration.metrics.port, metrics, liveness, interlock.readiness, versions
         )

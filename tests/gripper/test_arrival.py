@@ -15,6 +15,7 @@ START = Status(state=State.ACTIVE, go_to=True, object_=3, fault=0, echo=50, posi
 TARGET = 53
 """A millimetre further than 50: the count nearest to a width of 34.3 mm."""
 WIDTH_MM = 34.3
+MARGIN_S = 0.1
 
 
 class ScriptedLink:
@@ -46,7 +47,7 @@ class ScriptedLink:
 
 
 def moved(link: ScriptedLink) -> int:
-    gripper = Robotiq2F85(link, GripperSettings(move_margin_s=0.1))
+    gripper = Robotiq2F85(link, GripperSettings(move_margin_s=MARGIN_S))
     return asyncio.run(gripper.move_to_width(WIDTH_MM, 100.0, 20.0)).reading.position_count
 
 
@@ -61,6 +62,17 @@ def test_an_object_state_from_before_the_move_is_not_taken_for_arrival():
 def test_contact_ends_the_move_once_the_fingers_stand():
     touching = replace(START, echo=TARGET, object_=2, position=51)
     assert moved(ScriptedLink(touching, replace(touching, position=52))) == 52
+
+
+def test_fingers_that_arrived_are_not_late_because_their_answers_are_read_late():
+    class SlowLink(ScriptedLink):
+        async def status(self) -> Status:
+            await asyncio.sleep(1.5 * MARGIN_S)
+            return await super().status()
+
+    link = SlowLink(replace(START, echo=TARGET, position=TARGET))
+    assert moved(link) == TARGET
+    assert link.sent == [f"go_to {TARGET}"]
 
 
 @pytest.mark.parametrize(

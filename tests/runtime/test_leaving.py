@@ -5,9 +5,13 @@ import json
 
 import pytest
 
+from station.channel.client import ChannelClient
 from station.channel.line import CommandName
+from station.channel.panel import Actor
+from station.channel.panel_live import OperatorCommand, OperatorCommandName, OperatorCommandView
 from station.inspection.states import State
 from station.settings.gripper import GripperCalibration
+from station.settings.hmi import panel_endpoint
 from station.twin.fruit import Kind, draw_fruit
 from station.vocabulary import Reason, Refusal
 
@@ -75,6 +79,31 @@ def test_a_stop_while_the_arm_leaves_lets_no_trigger_in(bench):
             await cell.reach(State.STOPPED)
 
     asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_each_stop_of_a_person_is_carried_out_also_after_a_start_while_the_arm_leaves(bench):
+    """The first *Stop* is under way until the arm has left, and the *Start* in between has lifted it."""
+    kept = []
+
+    async def scenario():
+        async with bench(bench=False) as cell:
+            service, configuration = cell.station.service, cell.configuration
+            await ready_with_arm(cell)
+            await inspected_until_leaving(cell)
+            async with ChannelClient(panel_endpoint(configuration.hmi, configuration.home), "the station") as panel:
+                for order, stopped in (("stop", True), ("start", False), ("stop", True)):
+                    person = Actor(who="Ada", role="operator")
+                    request = OperatorCommand(person=person, order=OperatorCommandName(order))
+                    await panel.request(request, OperatorCommandView, deadline_s=20)
+                    assert service.stopped_by_person is stopped
+                    assert cell.phase is State.RETREATING_READY or order != "start"
+            cell.twin.boards["arm"].clear()
+            await cell.reach(State.STOPPED)
+            kept.append((configuration.home / "stopped_by_a_person").read_bytes())
+
+    asyncio.run(scenario())
+    assert kept == [b"yes"]
 
 
 def test_jaws_that_leave_are_wider_than_a_fruit_that_the_recipe_does_not_expect(bench, settings_file, tmp_path):

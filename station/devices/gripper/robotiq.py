@@ -98,7 +98,7 @@ class Robotiq2F85:
             deadline_s = time.monotonic() + self._settings.activation_timeout_s
             await self.link.reset()
             while (await self._poll())[0].state != State.RESET:
-                await self._wait_until(deadline_s, messages.STEP_RESET(), None)
+                await self._wait_until(deadline_s, time.monotonic(), messages.STEP_RESET(), None)
                 await self.link.reset()
             await asyncio.sleep(_RESET_HOLD_S)
             await self.link.begin_activation()
@@ -109,7 +109,7 @@ class Robotiq2F85:
                     return self._reading(status, at_s)
                 if status.fault and time.monotonic() - began_s > _RESET_HOLD_S:
                     raise GripperFaultError(status.fault)
-                await self._wait_until(deadline_s, messages.STEP_ACTIVATION(), status)
+                await self._wait_until(deadline_s, at_s, messages.STEP_ACTIVATION(), status)
 
     async def open(self, width_mm: float | None = None) -> MoveResult:
         """Open fast: fully, or to a width. Idempotent. Raises as `move_to_width`.
@@ -219,7 +219,7 @@ class Robotiq2F85:
             if not at_rest and renewed_at is not None and count - status.position <= renewed_at:
                 return status, at_s
             position = status.position
-            await self._wait_until(deadline_s, messages.STEP_MOVE(count=count), status)
+            await self._wait_until(deadline_s, at_s, messages.STEP_MOVE(count=count), status)
 
     def _go_on_unless_stopped(self, stops: int) -> None:
         if self._stops != stops:
@@ -243,8 +243,9 @@ class Robotiq2F85:
         return state != ObjectState.MOVING
 
     @staticmethod
-    async def _wait_until(deadline_s: float, step: Message, status: Status | None) -> None:
-        if time.monotonic() > deadline_s:
+    async def _wait_until(deadline_s: float, asked_s: float, step: Message, status: Status | None) -> None:
+        # By when the gripper was asked: fingers that arrived in time are not late because the answer was read late.
+        if asked_s > deadline_s:
             late = _late_at(step, status) if status else messages.LATE(step=step)
             raise GripperTimeoutError(late, messages.REMEDY_LATE())
         await asyncio.sleep(_POLL_S)

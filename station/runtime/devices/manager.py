@@ -68,6 +68,8 @@ class DeviceManager:
         )
         self._confirmed_clear = False
         self._gripper_reading: GripperReading | None = None
+        self.joints_rad: tuple[float, ...] | None = None
+        """The arm's joint positions as last monitored; None where it does not report them."""
         self._bad_frames, self._stale_checks = 0, 0
         self._not_activated: StationError | None = None
         checks = {CAMERA: self._check_camera, GRIPPER: self._check_gripper}
@@ -214,6 +216,12 @@ class DeviceManager:
             self.monitors[ARM].check_now()
 
     @property
+    def power_missing(self) -> StationError | None:
+        """Return the fault of an arm without power or with its brakes on, as after an emergency stop's release."""
+        fault = self.faults.get(ARM)
+        return fault if isinstance(fault, ArmFault) and fault.cause is ArmCause.NOT_POWERED else None
+
+    @property
     def needs_program_restart(self) -> bool:
         """Check whether the arm stopped only because this station was too slow for the controller's watchdog.
 
@@ -280,7 +288,8 @@ class DeviceManager:
 
     async def _check_arm(self) -> None:
         assert self._arm is not None  # noqa: S101 (the watch exists only with an arm)
-        fault = (await self._arm.state()).fault
+        state = await self._arm.state()
+        self.joints_rad, fault = state.joints_rad, state.fault
         stale = fault is not None and fault.cause is ArmCause.STALE
         self._stale_checks = self._stale_checks + 1 if stale else 0
         if fault is not None and not 0 < self._stale_checks < _STALE_CHECKS:

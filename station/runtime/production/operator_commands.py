@@ -112,6 +112,8 @@ class OperatorCommands:
     async def start(self, request: OperatorCommand) -> OperatorCommandView:
         """Start a command, and wait a moment for its end."""
         same = next((each for each in self.recent if _under_way(each, request)), None)
+        if request.order is OperatorCommandName.STOP and not self._service.stopped_by_person:
+            same = None  # a Start has lifted the one under way, or it is not in force yet: once more does no harm
         entry = same or OperatorCommandView(
             ticket=next(self._tickets),
             order=request.order,

@@ -67,6 +67,9 @@ class PlcCommands:
         self._line: Line | None = None
         self._line_at_s: float | None = None
         self._turn = asyncio.Lock()
+        self._stop_wanted = False
+        """By the last order of a person, also before its file has it."""
+        self._stop_file = asyncio.Lock()
 
     @property
     def line_age_s(self) -> float | None:
@@ -108,7 +111,14 @@ class PlcCommands:
     def restore_stop(self) -> None:
         """Restore a person's stop after a restart; it lasts until a reset."""
         if self._state_files.read(_STOPPED) == b"yes":
+            self._stop_wanted = True
             self._service.stop()
+
+    async def _store_stop(self) -> bool:
+        """Make it durable whether a person's stop is wanted; the last order's is what the file has at the end."""
+        async with self._stop_file:
+            wanted = b"yes" if self._stop_wanted else b"no"
+            return await asyncio.to_thread(self._state_files.write, _STOPPED, wanted)
 
     def set_line(self, line: Line) -> None:
         """Store the PLC interface's beat."""
@@ -240,9 +250,11 @@ class PlcCommands:
         Returns:
             Why the stop is not complete; None if it is.
         """
-        service = self._service
-        storing = asyncio.create_task(asyncio.to_thread(self._state_files.write, _STOPPED, b"yes"))
+        service, self._stop_wanted = self._service, True
+        storing = asyncio.create_task(self._store_stop())
         await asyncio.wait({storing}, timeout=STOP_WITHIN_S)  # durable before it is shown, but no disk delays a stop
+        if not self._stop_wanted:
+            return messages.STARTED_MEANWHILE()
         service.stop()
         if service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
             service.runner.post(Event.STOP, operation.STOPPED_AT_PANEL())
@@ -283,7 +295,7 @@ class PlcCommands:
         """Return why a reset would do nothing now; None if it would work."""
         if self._service.ending:
             return messages.ENDING()
-        if stop := self._devices.active_stop:
+        if stop := self._devices.active_stop or self._devices.power_missing:
             return messages.CONFIRM_STOP(stop=message_of(stop))
         busy = STATES[self._service.state].refusal is Refusal.BUSY
         return messages.BUSY_CALL_OFF() if busy else None
@@ -292,8 +304,9 @@ class PlcCommands:
         service, state = self._service, self._service.state
         if why_not := self.reset_refusal():
             return why_not
+        self._stop_wanted = False
         service.allow()
-        await asyncio.to_thread(self._state_files.write, _STOPPED, b"no")
+        await self._store_stop()
         if state in {State.IDLE, State.RETREATING_READY}:
             return None
         service.request_reset()
