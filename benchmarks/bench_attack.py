@@ -23,7 +23,7 @@ from typing import Any
 import psutil
 from attack import modbus, pages
 from attack.bystanders import HOST, Browser
-from attack.document import FILES_BACK_S, MOST_FILES_LEFT, Process, Row, markdown
+from attack.document import BACK_S, MOST_FILES_LEFT, MOST_GROWN_MB, Process, Row, markdown
 from attack.target import Attack, Found, Target
 from bench_hmi import demo, until
 from bench_plc import free_port
@@ -154,13 +154,14 @@ class Sampled(threading.Thread):
                 self.most = max(memory, self.most[0]), max(files, self.most[1])
 
     def result(self) -> Process:
-        """Return the figures, once the descriptors are what they were, or time is up."""
+        """Return the figures, once memory and descriptors are what they were, or time is up."""
         self.over.set()
         self.join()
-        until_s, after = time.monotonic() + FILES_BACK_S, self.before
+        until_s, after = time.monotonic() + BACK_S, self.before
+        most_mb, most_files = self.before[0] + MOST_GROWN_MB, self.before[1] + MOST_FILES_LEFT
         try:
             after = self.now()
-            while after[1] > self.before[1] + MOST_FILES_LEFT and time.monotonic() < until_s:
+            while (after[0] > most_mb or after[1] > most_files) and time.monotonic() < until_s:
                 time.sleep(0.5)
                 after = self.now()
         except psutil.Error:

@@ -12,7 +12,7 @@ from .bystanders import ANSWER_S, STOP_S
 from .target import Found
 
 LONGEST_P99_MS = 50.0
-MOST_GROWN_MB, MOST_FILES_LEFT, FILES_BACK_S = 32.0, 8, 60.0
+MOST_GROWN_MB, MOST_FILES_LEFT, BACK_S = 32.0, 8, 60.0
 ROOT = Path(__file__).resolve().parents[2]
 TITLES = {
     "": "nobody",
@@ -32,7 +32,7 @@ in, which orders *Stop* and *Start* over and over, each on new connections. Atta
 unless the row says otherwise. What is defended against whom: [Security](security.md)."""
 _HOLDS = f"""\
 A row holds if the attack gets what it has to get; each scan has its answer within {1000 * ANSWER_S:g} ms, and 99 %
-within {LONGEST_P99_MS:g} ms; each *Stop* is carried out within {STOP_S:g} s; {FILES_BACK_S:g} s after the attack the
+within {LONGEST_P99_MS:g} ms; each *Stop* is carried out within {STOP_S:g} s; {BACK_S:g} s after the attack the
 attacked process has at most {MOST_GROWN_MB:g} MB and {MOST_FILES_LEFT} descriptors more than before."""
 _COLUMNS = """\
 | on | attack | tries | what came of it | scans answered | errors | p50, ms | p99, ms | max, ms | *Stop* carried out \

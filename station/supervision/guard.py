@@ -22,8 +22,13 @@ NEXT_REQUEST_S = KEEP_ALIVE_S + 5.0
 """Likewise, to that request's end."""
 STALLED_S = 10.0
 """A client that does not take its response for so long is disconnected."""
-MOST_AT_ONCE = 128
-"""Connections taken from the kernel, or closed, before those that exist have their turn."""
+WAITING = 128
+"""Connections that the kernel keeps for us to accept."""
+ADMITTED_AT_ONCE = 4
+"""Connections accepted before those that exist have their turn. A request takes some five turns until it is known here:
+were as many accepted meanwhile as an address has places, they would displace the connection that it came by."""
+_TCP_INFO_BYTES_RECEIVED = slice(128, 136)
+"""In tcp_info of linux/tcp.h."""
 
 log = logging.getLogger(__name__)
 
@@ -47,9 +52,9 @@ def is_loopback(address: str) -> bool:
 class GuardedConnection(socket.socket):
     """One client's connection. It has its place until it is closed and its last request is answered."""
 
-    def __init__(self, accepted: socket.socket, client: tuple[str, int], places: Places["GuardedConnection"]) -> None:
+    def __init__(self, accepted: socket.socket, client: tuple[str, int], listener: "GuardedListener") -> None:
         super().__init__(accepted.family, accepted.type, accepted.proto, accepted.detach())
-        self._places = places
+        self._listener = listener
         self.client = client
         self.holder, self.known = client[0], False
         self.since_s = time.monotonic()
@@ -58,8 +63,19 @@ class GuardedConnection(socket.socket):
 
     @property
     def rank(self) -> tuple[float, ...] | None:
-        """One that never made a request is the first to give way, one with a request under way does not."""
-        return None if self.is_asking else (self.has_asked, self.since_s)
+        """A silent one gives way first, then one without a whole request; one with a request under way does not."""
+        if self.is_asking:
+            return None
+        return (2 if self.has_asked else 1 if self._has_spoken else 0, self.since_s)
+
+    @property
+    def _has_spoken(self) -> bool:
+        """Whether any byte has come, read or not."""
+        try:
+            info = self.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO_BYTES_RECEIVED.stop)
+        except OSError:
+            return False  # closed
+        return any(info[_TCP_INFO_BYTES_RECEIVED])
 
     @property
     def overdue(self) -> bool:
@@ -75,6 +91,8 @@ class GuardedConnection(socket.socket):
     def close(self) -> None:
         """Close it, and free its place."""
         super().close()
+        if not self._is_closed and not self.has_asked:
+            self._listener.ended_unasked = True
         self._is_closed = True
         self._leave()
 
@@ -89,7 +107,7 @@ class GuardedConnection(socket.socket):
 
     def _leave(self) -> None:
         if self._is_closed and not self.is_asking:
-            self._places.leave(self)
+            self._listener.places.leave(self)
 
 
 class GuardedListener(socket.socket):
@@ -104,13 +122,20 @@ class GuardedListener(socket.socket):
     def __init__(self, family: int, limits: Limits, known: Callable[[str], bool]) -> None:
         super().__init__(family, socket.SOCK_STREAM)
         self._known = known
-        self._places: Places[GuardedConnection] = Places(limits.most, limits.per_address, limits.reserve)
+        self.places: Places[GuardedConnection] = Places(limits.most, limits.per_address, limits.reserve)
         self._flood = ""
+        self.ended_unasked = False
+        """Whether a connection was closed without a request, since this was last set back."""
 
     @property
     def flooded_by(self) -> str:
         """The address that floods this listener; empty for none."""
-        return self._places.flooded_by
+        return self.places.flooded_by
+
+    def listen(self, backlog: int = WAITING) -> None:
+        """Listen; the kernel's queue is ours to choose, an event loop passes how many it accepts at once."""
+        del backlog
+        super().listen(WAITING)
 
     def accept(self) -> tuple[socket.socket, Any]:
         """Return the next connection that has got a place; others are closed.
@@ -118,20 +143,20 @@ class GuardedListener(socket.socket):
         Raises:
             BlockingIOError: there is none, or others have to have their turn.
         """
-        for _ in range(MOST_AT_ONCE):
+        for _ in range(WAITING):
             accepted, peer = super().accept()
-            connection = GuardedConnection(accepted, (peer[0], peer[1]), self._places)
+            connection = GuardedConnection(accepted, (peer[0], peer[1]), self)
             connection.known = self._known(connection.holder)
-            if self._places.enter(connection):
+            if self.places.enter(connection):
                 return connection, peer
             connection.close()
         raise BlockingIOError
 
     def sweep(self) -> None:
         """Disconnect clients whose request does not come; to be called every now and then."""
-        for connection in self._places:
+        for connection in self.places:
             if connection.overdue:
-                self._places.leave(connection)
+                self.places.leave(connection)
                 connection.displace()
         if self.flooded_by != self._flood:
             self._flood = self.flooded_by
@@ -146,7 +171,7 @@ class GuardedListener(socket.socket):
                 await app(scope, receive, send)
                 return
             client = tuple(scope["client"] or ())
-            connection = next((each for each in self._places if each.client == client), None)
+            connection = next((each for each in self.places if each.client == client), None)
             if connection is None:  # displaced, or overdue, while its request came
                 await PlainTextResponse("too many connections", 503, {"connection": "close"})(scope, receive, send)
                 return

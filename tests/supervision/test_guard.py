@@ -18,6 +18,7 @@ LARGE = b"GET /large HTTP/1.1\r\nhost: here\r\n\r\n"
 ENDLESS = b"GET /endless HTTP/1.1\r\nhost: here\r\n\r\n"
 LONG = b"GET /long HTTP/1.1\r\nhost: here\r\n\r\n"
 LIMITS = Limits(most=8, per_address=4, reserve=4)
+AS_PAGES = Limits(most=200, per_address=48, reserve=200)
 STRANGER, ANOTHER, KNOWN = "127.0.0.9", "127.0.0.8", "127.0.0.1"
 
 
@@ -80,7 +81,7 @@ async def until(what):
 def door():
     """Run a coroutine of a server's door in a loop of its own."""
 
-    def run(steps):
+    def run(steps, limits=LIMITS):
         async def serve():
             hold, under_way = asyncio.Event(), []
 
@@ -103,7 +104,7 @@ def door():
                 Route("/large", lambda _: Response(bytes(50_000_000))),
                 Route("/long", long),
             ]
-            listener = listen("127.0.0.1", 0, "hmi", "the pages", LIMITS, lambda address: address == KNOWN)
+            listener = listen("127.0.0.1", 0, "hmi", "the pages", limits, lambda address: address == KNOWN)
             server = Server(listener, Starlette(routes=routes), lifespan="off")
             serving = asyncio.create_task(server.run_until_exit())
             await until(lambda: server.started)
@@ -125,6 +126,43 @@ def test_silent_connections_make_room_and_end(door):
         assert await door.ask(ANOTHER)
         assert door.listener.flooded_by == STRANGER
         assert all([await ended(reader) for reader in silent])
+
+    door(steps)
+
+
+@pytest.mark.parametrize("sent", [b"", ASK[:-1], ASK], ids=["silent", "half a header", "whole requests"])
+def test_a_request_among_a_crowd_of_its_own_address_is_answered(door, sent):
+    async def steps(door):
+        with contextlib.ExitStack() as stack:
+
+            def come(count, sent):
+                """Without a turn of the server meanwhile."""
+                clients = [socket.create_connection(("127.0.0.1", door.port), 20, (STRANGER, 0)) for _ in range(count)]
+                for client in clients:
+                    stack.callback(client.close)
+                    client.sendall(sent)
+                return clients
+
+            come(30, sent)
+            (person,) = come(1, ASK)
+            come(90, sent)
+            person.setblocking(False)
+            async with asyncio.timeout(20):
+                assert (await asyncio.get_running_loop().sock_recv(person, 15)).startswith(b"HTTP/1.1 200")
+
+    door(steps, AS_PAGES)
+
+
+def test_who_speaks_is_not_displaced_by_silent_clients(door, monkeypatch):
+    monkeypatch.setattr("station.supervision.guard.FIRST_REQUEST_S", 30.0)
+
+    async def steps(door):
+        reader, writer = await door.come()
+        writer.write(ASK[:-2])  # as a TLS handshake that is not finished yet
+        for _ in range(12):
+            await door.come()
+        writer.write(ASK[-2:])
+        assert await answered(reader)
 
     door(steps)
 
