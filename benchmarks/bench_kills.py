@@ -14,6 +14,7 @@ import os
 import platform
 import random
 import select
+import shutil
 import signal
 import sqlite3
 import sys
@@ -25,7 +26,8 @@ from contextlib import closing
 from pathlib import Path
 
 import numpy as np
-from reliability.kills import Kill, kill_once, markdown
+from reliability.kills import Restarts, check_station, kill_in_round
+from reliability.kills_page import Made, Round, Station, markdown
 from reliability.rig import running
 from reliability.scenario import Expected, Scenario
 from sqlalchemy import select as select_rows
@@ -42,9 +44,11 @@ from station.settings.records import RecordsSettings
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "records-kills.md"
 WIRE_DOCUMENT = DOCUMENT.with_name("kills.md")
 WIRE_KILLS = Path(__file__).resolve().parent / "reliability" / "kills.json"
-KILLS_A_STATION = 20
-SIDE_BY_SIDE = 2
-"""A station waits most of the time: two use the machine better."""
+ROUNDS_A_STATION = 20
+LIMIT_MM2 = 50.0
+"""Limit between a sound and a bruised fruit of the twin."""
+SIDE_BY_SIDE = 3
+"""A station waits most of the time: some use the machine better."""
 SETTINGS = RecordsSettings(deadline_s=30.0, free_reserve_mb=1, images_quota_mb=1)
 STEPS = 8
 MOST_LINES = 24
@@ -151,35 +155,51 @@ def verify(folder: Path, told: dict[str, dict[int, int]], repeated: int) -> dict
     return dict(wrong)
 
 
-async def kills_of_one_station(seed: int, number: int) -> AsyncIterator[Kill]:
-    """Kill in one station after the other fruit until it does not come back, or often enough."""
+async def rounds_of_one_station(seed: int, number: int) -> AsyncIterator[Round | Station]:
+    """Kill in one station, round after round, until it does not come back or often enough; then check its records.
+
+    What a station with something wrong leaves is kept, and its place printed.
+    """
     chance, scenario = random.Random(seed), Scenario(name="kills", fault=None, expected=Expected(outcomes=("PASS",)))
-    with tempfile.TemporaryDirectory() as place:
-        async with running(Path(place), seed, scenario, chance.choice(("nest", "arm"))) as rig:
-            for each in range(min(number, KILLS_A_STATION)):
-                kill = await kill_once(rig, chance, seed, each)
-                print(kill.model_dump_json(), flush=True)
-                yield kill
-                if kill.wrong:
-                    return
+    placing, place = chance.choice(("nest", "arm", "arm", "arm")), Path(tempfile.mkdtemp())
+    kills, wrong, restarts = 0, False, Restarts()
+    async with running(place, seed, scenario, placing, LIMIT_MM2) as rig:
+        for each in range(ROUNDS_A_STATION):
+            made = await kill_in_round(rig, chance, restarts, seed, each)
+            kills, wrong = kills + len(made.kills), bool(made.wrong)
+            print(made.model_dump_json(), flush=True)
+            yield made
+            if wrong or kills >= number:
+                break
+    station = check_station(rig.records, seed)
+    print(station.model_dump_json(), flush=True)
+    yield station
+    if wrong or station.wrong:
+        print(f"what it left: {place}", flush=True)
+    else:
+        shutil.rmtree(place)
 
 
-async def kill_over_the_wire(number: int, seed: int | None) -> int:
-    """Make so many kills, and the page of all. How many of them had something wrong."""
+async def kill_over_the_wire(number: int, seed: int | None) -> bool:
+    """Make so many kills, and the page of all. Whether nothing was wrong."""
     if seed is not None:
-        return len([kill async for kill in kills_of_one_station(seed, number) if kill.wrong])
-    kills = [Kill.model_validate(each) for each in json.loads(WIRE_KILLS.read_text())] if WIRE_KILLS.exists() else []
-    before, seeds = len(kills), itertools.count(1 + max((kill.seed for kill in kills), default=0))
+        return not [made.wrong async for made in rounds_of_one_station(seed, number) if made.wrong]
+    made = Made.model_validate_json(WIRE_KILLS.read_text()) if WIRE_KILLS.exists() else Made()
+    before, seeds = made, itertools.count(1 + max((each.seed for each in made.rounds), default=0))
 
     async def one_after_the_other() -> None:
-        while (left := number - (len(kills) - before)) > 0:
-            async for kill in kills_of_one_station(next(seeds), left):
-                kills.append(kill)
-                WIRE_KILLS.write_text(json.dumps([each.model_dump() for each in kills], indent=0) + "\n")
-                WIRE_DOCUMENT.write_text(markdown(kills), encoding="utf-8")
+        nonlocal made
+        while (left := number - (made.kills - before.kills)) > 0:
+            async for each in rounds_of_one_station(next(seeds), left):
+                if isinstance(each, Round):
+                    made = Made(rounds=(*made.rounds, each), stations=made.stations)
+                else:
+                    made = Made(rounds=made.rounds, stations=(*made.stations, each))
+                WIRE_KILLS.write_text(made.model_dump_json(indent=0) + "\n")
+                WIRE_DOCUMENT.write_text(markdown(made), encoding="utf-8")
 
     await asyncio.gather(*(one_after_the_other() for _ in range(SIDE_BY_SIDE)))
-    return sum(bool(kill.wrong) for kill in kills[before:])
+    return made.bad == before.bad
 
 
 def main() -> int:
@@ -191,7 +211,7 @@ def main() -> int:
     parser.add_argument("--json", action="store_true", help="print JSON; write no document")
     arguments = parser.parse_args()
     if arguments.wire is not None:
-        return 1 if asyncio.run(kill_over_the_wire(arguments.wire, arguments.seed)) else 0
+        return 0 if asyncio.run(kill_over_the_wire(arguments.wire, arguments.seed)) else 1
     told: dict[str, dict[int, int]] = {"begun": {}, "concluded": {}, "published": {}, "audited": {}}
     repeated, began_s = 0, time.perf_counter()
     with tempfile.TemporaryDirectory() as place:

@@ -3,30 +3,35 @@
 import asyncio
 import random
 import time
-from collections import Counter
+from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import closing
+from pathlib import Path
 from typing import Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict
-
 from plc_interface.plc_simulator.program import Decision, Passage
+from station.records.audit_check import check_trail
+from station.records.database import plain, reading
+from station.records.integrity_check import check_records
+from station.supervision.supervisor import RESTARTS, RESTARTS_WITHIN_S
 
 from .clock import CannotDoError
+from .kills_page import Kill, Round, Station
 from .play import disagreements
 from .rig import Rig
 from .scenario import DeviceFault, ProcessFault
 
-PROCESSES = ("service", "service", "plc", "hmi", "arm")
+Process = Literal["service", "plc", "hmi", "arm"]
+_PROCESSES: tuple[Process, ...] = ("service", "service", "plc", "hmi", "arm")
 """The service twice: it is what has the states."""
-MOMENTS = ("inspection", "inspection", "release", "idle")
-"""Within `LONGEST_S` of the accepted trigger; within `_RELEASE_S` of the result; with nothing under way."""
-LONGEST_S = 6.0
-"""A process is killed within this time after the trigger was accepted."""
-STOPS = ("", "", "", "protective stop", "person's stop")
+_MOMENTS = {"inspection": 4.0, "release": 3.0, "idle": 1.0}
+"""A process is killed within this time after the accepted trigger, after its result, or with nothing under way; s."""
+_STOPS = ("", "", "", "protective stop", "person's stop")
 """What is done before the kill."""
-FRUIT = "fruit between the jaws"
-_RELEASE_S = 1.5
-_IDLE_S = 1.0
+_BRUISED = 0.3
+_AGAIN_S = 3.0
+_IN_HOLD_S = 1.0
+_FRUIT = "fruit between the jaws"
 _PATIENCE_S = 120.0
 _SHOWN_S = 5.0
 """A killed process is missed within this time."""
@@ -34,56 +39,49 @@ _STAYS_S = 1.5
 _LOOK_S = 0.02
 _OPENED_S = 0.2
 """Jaws that were told to open before the kill have begun to."""
+_OPENING_S = 0.1
 _STILL_RAD, _STILL_MM = 1e-3, 0.1
-_STATES = {"held": FRUIT, "aborted": "protective stop", "stopped": "person's stop"}
+_STATES = {"held": _FRUIT, "aborted": "protective stop", "stopped": "person's stop"}
 """PackML's states for what only a person may end."""
-_ALARMS = {FRUIT: "fruit_held", "protective stop": "protective_stop"}
+_ALARMS = {_FRUIT: "fruit_held", "protective stop": "protective_stop"}
 _NOT_ACCEPTED = {Decision.REFUSED, Decision.NO_ANSWER}
+_JUDGED = {"PASS", "FAIL"}
 
 
-_HEAD = """# Kills during inspections
+class Restarts:
+    """Kills of one station's processes that the supervisor, which gives up at too many, still has in mind."""
 
-`./run bench kills --wire N` adds N kills to this page: the whole station with the simulated cell and a PLC on the wire.
-One process is killed (SIGKILL) at a random moment within 6 s of an accepted trigger, within 1.5 s of the result, while
-the jaws open or the arm carries the fruit, or with nothing under way; there the next trigger follows at once. Before
-two in five kills the arm stops protectively or a person stops the station at the panel. Afterwards: one outcome for
-each trigger, the same in the records, and acknowledged; what only a person may end is still held, nothing moves in it,
-and the person's recovery and reset lead on. The arm carries the fruit to its place in every second station, where a
-kill of the service with a judged fruit between the jaws has to be held too. `--seed S` repeats a station's kills.
-[Kills of the records alone](records-kills.md) have a page of their own.
+    def __init__(self) -> None:
+        self._killed_s: dict[str, deque[float]] = {}
 
-A trigger that comes while the station does not miss the killed process yet gets no inspection: the PLC reads a refusal,
-or no answer in time, and diverts the fruit.
-"""
+    async def spare(self, processes: Sequence[str]) -> None:
+        """Wait until all of these may be killed."""
+        for process in {*processes} - {"arm"}:  # which the service starts again, as often as it takes
+            killed_s = self._killed_s.setdefault(process, deque(maxlen=RESTARTS))
+            while True:
+                now_s = time.monotonic()
+                recent = sum(now_s - each < RESTARTS_WITHIN_S + _SHOWN_S for each in killed_s)
+                if recent + processes.count(process) <= RESTARTS:
+                    break
+                await asyncio.sleep(_LOOK_S)
+
+    def note(self, process: str) -> None:
+        """Note a kill."""
+        self._killed_s.setdefault(process, deque(maxlen=RESTARTS)).append(time.monotonic())
 
 
-class Kill(BaseModel):
-    """One kill and what came of it."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    seed: int
-    number: int
-    """Of the kill, since the station with this seed was started."""
-    process: str
-    """Empty where what is wrong came before the kill."""
-    moment: str
-    state: str
-    """PackML's, as the PLC read it last before the kill."""
-    outcome: str
-    """The PLC's decision; empty where nothing was triggered."""
-    held: str
-    """What a person had to end afterwards; empty for nothing."""
-    took_s: float
-    wrong: tuple[str, ...]
+class _Planned(NamedTuple):
+    process: Process
+    after_s: float
 
 
 class _Plan(NamedTuple):
-    process: Literal["service", "plc", "hmi", "arm"]
+    bruised: bool
     moment: str
-    after_s: float
     stop: str
     stop_s: float
+    kills: tuple[_Planned, ...]
+    in_hold: tuple[_Planned, ...]
 
 
 class _Stuck(Exception):  # noqa: N818 (no error of the program's)
@@ -91,12 +89,14 @@ class _Stuck(Exception):  # noqa: N818 (no error of the program's)
 
 
 class _Run:
-    """One kill in a running station."""
+    """One round in a running station."""
 
-    def __init__(self, rig: Rig, plan: _Plan) -> None:
-        self.rig, self.wire, self.plan = rig, rig.wire, plan
+    def __init__(self, rig: Rig, plan: _Plan, restarts: Restarts) -> None:
+        self.rig, self.wire, self.plan, self._restarts = rig, rig.wire, plan, restarts
         self.accepted, self.passages = len(rig.wire.accepted), len(rig.wire.passages)
-        self.state, self.killed, self.held = "", False, ""
+        self.kills: list[Kill] = []
+        self.held = self._must_hold = ""
+        self._closed_mm: float | None = None
         self.wrong: list[str] = []
 
     async def make(self) -> None:
@@ -104,7 +104,7 @@ class _Run:
 
         Raises:
             _Stuck: it cannot.
-            CannotDoError: the process is not there.
+            CannotDoError: a process is not there.
         """
         plan, wire = self.plan, self.wire
         idle = plan.moment == "idle"
@@ -117,18 +117,20 @@ class _Run:
         if plan.stop:
             await asyncio.sleep(plan.stop_s)
             await self._stop()
-        await asyncio.sleep(plan.after_s)
-        must_hold = await self._kill()
+        await self._kill(plan.kills[0], plan.moment, at_once=idle)
         if idle and triggers:
-            await self.rig.lay_and_trigger()
+            await self.rig.lay_and_trigger(bruised=plan.bruised)
+        for planned in plan.kills[1:]:
+            await self._kill(planned, "again")
         if triggers:
             await _until(lambda: self._gone > 0, "the line gets no outcome")
-        if idle and triggers and self.wire.passages[-1].decision in _NOT_ACCEPTED:
+        if idle and triggers and wire.passages[-1].decision in _NOT_ACCEPTED:
             await self._missed()
         self.held = await self._needs_person()
-        if must_hold and not self.held:
-            self.wrong.append(f"{must_hold} was forgotten")
+        if self._must_hold and not self.held:
+            self.wrong.append(f"{self._must_hold} was forgotten")
         if self.held:
+            await self._kill_in_hold()
             await self._person()
         await _until(lambda: wire.ready, f"not ready again ({wire.standing})")
         self._check_outcome(1 if triggers else 0, may_be_refused=idle)
@@ -137,8 +139,14 @@ class _Run:
     def _gone(self) -> int:
         return len(self.wire.passages) - self.passages
 
+    @property
+    def _judged(self) -> bool:
+        accepted = self.wire.accepted[self.accepted :]
+        results = (shown for results in self.wire.shown.values() for shown in results)
+        return any(shown.trigger_id in accepted and shown.outcome in _JUDGED for shown in results)
+
     async def _trigger(self) -> None:
-        await self.rig.lay_and_trigger()
+        await self.rig.lay_and_trigger(bruised=self.plan.bruised)
         await _until(lambda: len(self.wire.accepted) > self.accepted or self._gone > 0, "the trigger is not answered")
         if self._gone and self.wire.passages[-1].decision in _NOT_ACCEPTED:
             raise _Stuck(f"the trigger is not accepted: {_outcome(self.wire.passages[-1])}")
@@ -151,25 +159,49 @@ class _Run:
             await _until(lambda: self.wire.packml == "aborted", "a safety stop is not shown")
         elif not await self.rig.stop_at_the_panel():
             raise _Stuck("a person's stop is not shown")
+        self._must_hold = self.plan.stop
 
-    async def _kill(self) -> str:
-        """Kill the process; what has to be held afterwards."""
-        wire, plan = self.wire, self.plan
-        self.state, shown = wire.packml, wire.ready
-        idle = plan.moment == "idle"
-        judged = self._gone > 0 or wire.result_valid
-        await self.rig.begin(ProcessFault(process=plan.process, signal="SIGKILL"))
-        self.killed = True
-        await asyncio.sleep(0.0 if idle else _OPENED_S)
-        carried = (
-            self.rig.configuration.service.placing == "arm"
-            and plan.process == "service"
-            and judged
-            and not await self.rig.jaws_open()
-        )
-        if shown and not idle and plan.process != "hmi":
+    async def _kill(self, planned: _Planned, moment: str, *, at_once: bool = False) -> None:
+        """Kill a process, and note what has to be held afterwards."""
+        await asyncio.sleep(planned.after_s)
+        wire, process = self.wire, planned.process
+        shown, judged = wire.ready, self._judged
+        held = wire.packml == "held" and "fruit_held" in wire.alarms
+        await self._signal(process, moment)
+        if at_once:
+            return
+        if held and not self._must_hold:
+            self._must_hold = _FRUIT
+        await asyncio.sleep(_OPENED_S)
+        if judged and process in {"service", "arm"} and self.rig.configuration.service.placing == "arm":
+            await self._must_hold_fruit()
+        if shown and process != "hmi":
             await self._missed()
-        return plan.stop or (FRUIT if carried or (self.state == "held" and "fruit_held" in wire.alarms) else "")
+
+    async def _signal(self, process: Process, moment: str) -> None:
+        """Kill; where the process is between two starts, as soon as there is one."""
+        ends_s = time.monotonic() + _PATIENCE_S
+        while True:
+            state = self.wire.packml
+            try:
+                await self.rig.begin(ProcessFault(process=process, signal="SIGKILL"))
+            except CannotDoError:
+                if time.monotonic() > ends_s:
+                    raise
+                await asyncio.sleep(_LOOK_S)
+            else:
+                break
+        self._restarts.note(process)
+        self.kills.append(Kill(process=process, moment=moment, state=state))
+
+    async def _must_hold_fruit(self) -> None:
+        """Note that a person has to take a judged fruit, where it is between jaws that do not open."""
+        before_mm = (await self.rig.twin(do="state"))["width_mm"]
+        await asyncio.sleep(_OPENING_S)
+        if not await self.rig.jaws_open() and self._closed_mm is None:
+            now_mm = (await self.rig.twin(do="state"))["width_mm"]
+            if abs(now_mm - before_mm) < _STILL_MM:
+                self._closed_mm, self._must_hold = now_mm, self._must_hold or _FRUIT
 
     async def _missed(self) -> None:
         """Wait until the killed process is missed: the readiness that is read may be from before the kill."""
@@ -196,6 +228,14 @@ class _Run:
             await asyncio.sleep(_LOOK_S)
         raise _Stuck(f"neither ready nor held ({wire.standing})")
 
+    async def _kill_in_hold(self) -> None:
+        """Kill while the person is waited for."""
+        for planned in self.plan.in_hold:
+            await self._kill(planned, "held")
+            now = await self._needs_person()
+            if now != self.held:
+                raise _Stuck(f"{self.held} was {now or 'nothing'} after another kill")
+
     async def _person(self) -> None:
         """See that nothing moves, then lead on."""
         before = await self.rig.twin(do="state")
@@ -205,6 +245,8 @@ class _Run:
             self.wrong.append("the arm moves while held")
         if abs(before["width_mm"] - after["width_mm"]) > _STILL_MM:
             self.wrong.append("the jaws move while held")
+        if self._closed_mm is not None and after["width_mm"] - self._closed_mm > _STILL_MM:
+            self.wrong.append("the jaws let the fruit go before a person came")
         await self.rig.twin(do="remove")
         if self.held == "protective stop":
             await self.rig.carry_out("recover protective-stop")
@@ -217,21 +259,23 @@ class _Run:
         for passage in self.wire.passages[self.passages :]:
             if passage.decision in _NOT_ACCEPTED and not may_be_refused:
                 self.wrong.append(f"{passage.decision} to an accepted trigger")
+            if passage.decision is (Decision.PASS if self.plan.bruised else Decision.FAIL):
+                self.wrong.append(f"{passage.decision} for a {'bruised' if self.plan.bruised else 'sound'} fruit")
 
 
-async def kill_once(rig: Rig, chance: random.Random, seed: int, number: int) -> Kill:
-    """Kill a process, most times while a fruit is inspected, and see that everything holds and the line goes on.
+async def kill_in_round(rig: Rig, chance: random.Random, restarts: Restarts, seed: int, number: int) -> Round:
+    """Kill processes while a fruit is inspected, and see that everything holds and the line goes on.
 
     Args:
         rig: ready for a trigger.
         chance: decides what is killed, and when.
+        restarts: the station's.
         seed: of `chance`.
-        number: of the kill.
+        number: of the round.
     """
-    process, moment, stop = chance.choice(PROCESSES), chance.choice(MOMENTS), chance.choice(STOPS)
-    longest_s = {"inspection": LONGEST_S, "release": _RELEASE_S, "idle": _IDLE_S}[moment]
-    plan = _Plan(process, moment, chance.uniform(0.0, longest_s), stop, chance.uniform(0.0, longest_s / 2))
-    began_s, run = time.monotonic(), _Run(rig, plan)
+    plan = _draw(chance)
+    await restarts.spare([each.process for each in (*plan.kills, *plan.in_hold)])
+    began_s, run = time.monotonic(), _Run(rig, plan, restarts)
     try:
         await run.make()
     except (_Stuck, CannotDoError) as stuck:
@@ -239,17 +283,55 @@ async def kill_once(rig: Rig, chance: random.Random, seed: int, number: int) -> 
     run.wrong += disagreements(rig, run.accepted)
     gone = rig.wire.passages[run.passages :]
     rig.wire.forget_alarms()
-    return Kill(
+    return Round(
         seed=seed,
         number=number,
-        process=process if run.killed else "",
-        moment=moment,
-        state=run.state,
+        placing=rig.configuration.service.placing,
+        bruised=plan.bruised,
+        kills=tuple(run.kills),
         outcome=_outcome(gone[-1]) if gone else "",
         held=run.held,
         took_s=round(time.monotonic() - began_s, 1),
         wrong=tuple(run.wrong),
     )
+
+
+def check_station(folder: Path, seed: int) -> Station:
+    """Check a station's records after its end.
+
+    Args:
+        folder: the records'.
+        seed: of the station.
+    """
+    found = check_records(folder)
+    known = check_trail(folder).notes  # a kill between a row and its signature is noted by the next start
+    wrong = [*found.faults, *(note for note in found.notes if note not in known)]
+    with reading(folder) as connection, closing(plain(connection).cursor()) as cursor:
+        questions = {
+            "inspections without an outcome that the PLC acknowledged": "SELECT count(*) FROM inspections "
+            "WHERE outcome IS NULL OR published_utc_ms IS NULL OR acknowledged_utc_ms IS NULL",
+            "inspections not in the outbox": "SELECT count(*) FROM inspections WHERE sequence NOT IN "
+            "(SELECT row FROM outbox WHERE kind = 'inspection')",
+        }
+        for what, question in questions.items():
+            (number,) = cursor.execute(question).fetchone()
+            wrong += [f"{number} {what}"] if number else []
+        (rows,) = cursor.execute("SELECT count(*) FROM audit").fetchone()
+    return Station(seed=seed, inspections=found.inspections, images=found.images, audit_rows=rows, wrong=tuple(wrong))
+
+
+def _draw(chance: random.Random) -> _Plan:
+    moment, stop = chance.choice(("inspection", "inspection", "release", "release", "idle")), chance.choice(_STOPS)
+    longest_s = _MOMENTS[moment]
+    first = _Planned(chance.choice(_PROCESSES), chance.uniform(0.0, longest_s))
+    again = [
+        _Planned(chance.choice(_PROCESSES), chance.uniform(0.0, _AGAIN_S)) for _ in range(chance.choice((0, 1, 1, 2)))
+    ]
+    in_hold = [
+        _Planned(chance.choice(_PROCESSES), chance.uniform(0.0, _IN_HOLD_S)) for _ in range(chance.choice((0, 1, 2)))
+    ]
+    stop_s, bruised = chance.uniform(0.0, longest_s / 2), chance.random() < _BRUISED
+    return _Plan(bruised, moment, stop, stop_s, (first, *again), tuple(in_hold))
 
 
 def _outcome(passage: Passage) -> str:
@@ -264,49 +346,3 @@ async def _until(holds: Callable[[], bool], otherwise: str) -> None:
         if time.monotonic() > ends_s:
             raise _Stuck(otherwise)
         await asyncio.sleep(_LOOK_S)
-
-
-def markdown(kills: Sequence[Kill]) -> str:
-    """The page.
-
-    Args:
-        kills: all that were made.
-    """
-    made = [kill for kill in kills if kill.process]
-    wrong = Counter(line for kill in kills for line in kill.wrong)
-    processes = sorted(set(PROCESSES))
-    count = Counter((kill.moment, kill.state, kill.process) for kill in made)
-    places = sorted({(kill.moment, kill.state) for kill in made})
-    seeds = Counter(kill.seed for kill in made)
-    bad = sum(bool(kill.wrong) for kill in kills)
-    held = sorted(Counter(kill.held for kill in made if kill.held).items())
-    outcomes = sorted(Counter(kill.outcome for kill in made if kill.outcome).items())
-    median_s = sorted(kill.took_s for kill in made)[len(made) // 2] if made else 0.0
-    lines = [
-        _HEAD,
-        f"{len(made)} kills, {bad} times something wrong; {median_s:.0f} s each in the middle.",
-        "",
-        f"| moment | state that the PLC read | {' | '.join(processes)} |",
-        f"| --- | --- |{' --- |' * len(processes)}",
-        *(
-            f"| {moment} | {state or 'none'} | {' | '.join(str(count[moment, state, each]) for each in processes)} |"
-            for moment, state in places
-        ),
-        "",
-        "| ended by a person afterwards | kills |",
-        "| --- | --- |",
-        *(f"| {name} | {number} |" for name, number in held),
-        "",
-        "| outcome | fruits |",
-        "| --- | --- |",
-        *(f"| {name} | {number} |" for name, number in outcomes),
-        "",
-        "| wrong | times |",
-        "| --- | --- |",
-        *(f"| {line} | {number} |" for line, number in sorted(wrong.items())),
-        *([] if wrong else ["| nothing | 0 |"]),
-        "",
-        "Seeds, each with its kills: " + ", ".join(f"{seed} ({number})" for seed, number in sorted(seeds.items())),
-        "",
-    ]
-    return "\n".join(lines)

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import os
+import random
 import signal
 import socket
 import subprocess
@@ -59,6 +60,7 @@ _SWEEPS_SLOWER = 2.0
 """A sweep takes 0.15 s, in which a busy machine neither sees the phase nor measures enough frames for a PASS."""
 _JAWS_OPEN_MM = 50.0
 _START_S = 120.0
+_FIRST_PORT, _PORTS_END = 20_000, 30_000
 _STOP_S = 10.0
 
 
@@ -88,9 +90,9 @@ class Rig:
         """Ask the twin's console."""
         return await asyncio.to_thread(ask, LOOPBACK, self._console, request)
 
-    async def lay_and_trigger(self) -> None:
-        """Bring a good fruit and trigger; the line has to be ready."""
-        await self.twin(do="fruit", kind=FRUIT, seed=_SEED)
+    async def lay_and_trigger(self, *, bruised: bool = False) -> None:
+        """Bring a good fruit, or a bruised one, and trigger; the line has to be ready."""
+        await self.twin(do="fruit", kind=FRUIT, seed=_SEED, bruised=bruised)
         self.wire.trigger()
 
     async def jaws_open(self) -> bool:
@@ -292,14 +294,17 @@ def _why(address: str) -> str:
 
 
 def _free_ports(count: int) -> list[int]:
-    with contextlib.ExitStack() as stack:
-        probes = [stack.enter_context(socket.socket()) for _ in range(count)]
-        for probe in probes:
-            probe.bind((LOOPBACK, 0))
-        return [probe.getsockname()[1] for probe in probes]
+    """Ports that no connection takes while a killed process is away: below those of outgoing connections."""
+    ports = list[int]()
+    while len(ports) < count:
+        port = random.randrange(_FIRST_PORT, _PORTS_END)
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind((LOOPBACK, port))
+            ports += [] if port in ports else [port]
+    return ports
 
 
-def _quick_recipes(folder: Path, measured: str) -> Path:
+def _quick_recipes(folder: Path, measured: str, limit_mm2: float) -> Path:
     """The shipped recipe with few steps: the matrix is about faults, not about fruit."""
     folder.mkdir()
     values = load_recipes()[FRUIT].model_dump(mode="json")
@@ -309,7 +314,7 @@ def _quick_recipes(folder: Path, measured: str) -> Path:
     # The unit is not calibrated and no grader tells a size: by a usual coverage no fruit would pass.
     values["damage"].pop("size", None)
     values["damage"]["uncertainty"] = {"coverage": 0.6, "repeatability": [{"closing_mm": 3.0, "relative": 0.03}]}
-    values["damage"]["area"][-1]["area_mm2"] = 140
+    values["damage"]["area"][-1]["area_mm2"] = limit_mm2
     values["early_stop"] = {"area_mm2": 150, "growth_mm2_per_mm": 90}
     values["expected_width"]["largest_mm"] = min(values["expected_width"]["largest_mm"], 42.0)
     (folder / f"{FRUIT}.yaml").write_text(json.dumps(values), encoding="utf-8")
@@ -318,7 +323,11 @@ def _quick_recipes(folder: Path, measured: str) -> Path:
 
 @contextlib.asynccontextmanager
 async def running(
-    folder: Path, number: int, scenario: Scenario, placing: Literal["nest", "arm"] = "nest"
+    folder: Path,
+    number: int,
+    scenario: Scenario,
+    placing: Literal["nest", "arm"] = "nest",
+    limit_mm2: float = 140.0,
 ) -> AsyncIterator[Rig]:
     """Start a station on addresses of its own, with the patience of a busy machine; it ends with the block.
 
@@ -327,6 +336,7 @@ async def running(
         number: another one for each station that this process starts.
         scenario: what will be played; the station is prepared for it.
         placing: the service's setting.
+        limit_mm2: the recipe's, of the contact area.
 
     Raises:
         CannotDoError: the fault's disk or clock cannot be had.
@@ -337,18 +347,24 @@ async def running(
     file = folder / "station.yaml"
     values = {
         "home": str(folder / "home"),
-        "recipes_folder": str(_quick_recipes(folder / "recipes", scenario.measured)),
+        "recipes_folder": str(_quick_recipes(folder / "recipes", scenario.measured, limit_mm2)),
         "modbus": {"port": modbus},
         "metrics": {"port": metrics},
         "hmi": {"port": hmi},
         "arm": {
             "host": host,
+            "frequency_hz": 125.0,
             "stale_after_s": 1.0,
             "link_lost_after_s": 2.0,
             "watchdog_hz": 0.5,
             "constructor_limit_s": 30.0,
         },
-        "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
+        "gripper": {
+            "urcap": {"host": host},
+            "modbus_rtu": {"host": host},
+            "answer_timeout_s": 2.0,
+            "move_margin_s": 10.0,
+        },
         "camera": {"oldest_s": 2.0, "twin": {"port": camera}},
         "records": {"free_reserve_mb": 1},
         "service": {

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.virtual import interface, laws
-from benchmarks.virtual import station as virtual_station
+from benchmarks.virtual import actions, interface, laws
 from benchmarks.virtual.play import play
 from benchmarks.virtual.story import Story, Trouble, draw, shrink
 from plc_interface.handshake.journal import Journal
@@ -46,6 +45,12 @@ def test_laws_hold_over_a_thousand_triggers():
     assert triggers >= STORIES * FRUITS
 
 
+def test_a_connection_cut_and_made_again_within_a_scan_arms_again():
+    cut = Trouble(part="plc", kind="reconnect", at_s=138.672, lasts_s=1.408)
+    report = play(Story(seed=101, fruits=44, troubles=(cut,), carries=True))
+    assert report.broken is None, report.broken
+
+
 def test_the_same_story_gives_the_same_play():
     one, other = play(draw(7, FRUITS)), play(draw(7, FRUITS))
     assert (one.decided, one.virtual_s, one.by_trouble) == (other.decided, other.virtual_s, other.by_trouble)
@@ -75,13 +80,13 @@ def test_an_outcome_that_is_shown_again_is_found(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_judge_that_passes_everything_is_found(monkeypatch: pytest.MonkeyPatch):
-    real = virtual_station.judged
+    real = actions.judged
 
     def kind(press: Press) -> Judgement:
         verdict = real(press)
         return replace(verdict, outcome="PASS", findings=())
 
-    monkeypatch.setattr(virtual_station, "judged", kind)
+    monkeypatch.setattr(actions, "judged", kind)
     assert found(laws.WHOLE_PRESS).troubles == ()
 
 

@@ -11,7 +11,13 @@ import pytest
 from station.channel.client import ChannelClient
 from station.channel.line import CommandName, PackmlState
 from station.channel.panel import Actor
-from station.channel.panel_live import OperatorCommand, OperatorCommandName, OperatorCommandView
+from station.channel.panel_live import (
+    GetPanelState,
+    OperatorCommand,
+    OperatorCommandName,
+    OperatorCommandView,
+    PanelState,
+)
 from station.messages import commands, states
 from station.settings.configuration import load_configuration
 from station.settings.hmi import panel_endpoint
@@ -127,11 +133,14 @@ def test_a_killed_a_stopped_and_an_ended_station_lose_and_double_nothing(cell):
     assert "Traceback" not in log
 
 
-async def stop_at_the_panel(file):
+async def at_the_panel(file, request, reply):
     configuration = load_configuration(file, {})
-    order = OperatorCommand(person=Actor(who="Olga", role="operator"), order=OperatorCommandName.STOP)
     async with ChannelClient(panel_endpoint(configuration.hmi, configuration.home), "the station") as panel:
-        return await panel.request(order, OperatorCommandView, deadline_s=20)
+        return await panel.request(request, reply, deadline_s=20)
+
+
+def order(name, argument=""):
+    return OperatorCommand(person=Actor(who="Olga", role="operator"), order=name, argument=argument)
 
 
 @pytest.mark.timeout(400)
@@ -202,9 +211,46 @@ def test_what_only_a_person_may_end_outlives_kills_and_nothing_moves_meanwhile(c
     asyncio.run(is_held(PackmlState.ABORTED, states.LATCHED()))
     asyncio.run(reset())
 
-    assert asyncio.run(stop_at_the_panel(cell.file)).state == "done"
+    done = asyncio.run(at_the_panel(cell.file, order(OperatorCommandName.STOP), OperatorCommandView))
+    assert done.state == "done"
     service.kill()
     service.wait()
     service = cell.service()
     asyncio.run(is_held(PackmlState.STOPPED, states.STOPPED()))
     asyncio.run(reset())
+
+
+@pytest.mark.timeout(240)
+def test_after_an_emergency_stop_a_person_is_offered_only_what_can_work(cell):
+    """Nothing while the button is pressed, then the power, and *Start* only when the arm has it."""
+    cell.service()
+
+    async def offered(recoveries, *, start):
+        """Wait until the panel offers this."""
+        async with asyncio.timeout(60):
+            while True:
+                state = await at_the_panel(cell.file, GetPanelState(), PanelState)
+                found = state.recoveries, OperatorCommandName.START in state.may
+                if found == (recoveries, start) and state.packml_state is PackmlState.ABORTED:
+                    return
+                assert found[1] <= start or state.packml_state is not PackmlState.ABORTED, "never too early"
+                await asyncio.sleep(0.05)
+
+    async def scenario():
+        async with cell.line() as line:
+            assert (await line.order(CommandName.CHANGE_RECIPE, 2)).done
+            await line.ready()
+            cell.twin_is(do="set", device="arm", fault="emergency_stop", amount=1.0)
+            await offered((), start=False)
+            cell.twin_is(do="clear", device="arm", fault="emergency_stop")
+            await offered(("power",), start=False)
+            refused = await line.order(CommandName.RESET)
+            assert (refused.done, refused.why.id) == (False, commands.CONFIRM_STOP.id)
+            powered = await at_the_panel(cell.file, order(OperatorCommandName.RECOVER, "power"), OperatorCommandView)
+            assert powered.state != "failed", powered.why
+            await offered((), start=True)
+            started = await line.order(CommandName.RESET)
+            assert started.done, started.why
+            await line.ready()
+
+    asyncio.run(scenario())
