@@ -14,7 +14,7 @@ from plc_interface.handshake.machine import next_due_s, step
 from plc_interface.handshake.state import restarted
 from plc_interface.handshake.view import view
 from plc_interface.registers.codec import decode, encode
-from plc_interface.registers.map import BY_NAME, RESULT, STATUS
+from plc_interface.registers.map import BY_NAME, MORE_STATUS, RESULT, STATUS
 from station.channel.line import BeginReply, Outcome
 from station.settings.plc import HandshakeSettings
 
@@ -27,7 +27,7 @@ SETTINGS = HandshakeSettings(beat_period_s=0.3)
 _CONTROL = BY_NAME["control"]
 _INVALID = {
     register.name: decode(register, encode(register, None))
-    for register in (*STATUS, *RESULT)
+    for register in (*STATUS, *RESULT, *MORE_STATUS)
     if register.invalid is not None
 }
 _LOST_SHARE = 0.3

@@ -13,13 +13,14 @@ from plc_interface.plc_simulator.program import LineProgram
 from station.inspection.states import State
 from station.runtime.alarms import manager
 
+from .cell import Cell
 from .clock import Clock
 from .devices import Devices
 from .inspection import RECIPE, Fruit, draw_fruit
 from .interface import Interface, Machine
 from .laws import ALARMS_RETURN, LawBrokenError, Laws
 from .records import MemoryRecords
-from .station import Cell, Station
+from .station import Station
 from .story import Story, Trouble
 
 SCAN_S = 0.15
