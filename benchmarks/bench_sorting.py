@@ -4,7 +4,7 @@ Run with `./run bench sorting`. Closings are imaged once and kept below `state/s
 draws and measures them; judging them by another recipe then takes seconds. `--count 300` images about 1,800 closings of
 each kind, 75 minutes on two cores, and can be interrupted and resumed. Writes the tables of `docs/sorting.md`, and the
 first one into `README.md`; other seeds and a part of the kinds print them only: what is tuned on must not be
-published as the result.
+published as the result. `--limits` compares area limits on sound and mildly damaged fruit, to choose one.
 """
 
 import argparse
@@ -54,26 +54,49 @@ def without_stop(recipe: Recipe) -> Recipe:
     return recipe.model_copy(update={"steps": recipe.steps.model_copy(update={"stop_when_decided": False})})
 
 
+def with_limits(recipe: Recipe, limits: str) -> Recipe:
+    """The recipe with other area limits, mm², separated by commas."""
+    areas = [float(limit) for limit in limits.split(",")]
+    thresholds = zip(recipe.damage.area, areas, strict=True)
+    changed = tuple(threshold.model_copy(update={"area_mm2": area}) for threshold, area in thresholds)
+    return recipe.model_copy(update={"damage": recipe.damage.model_copy(update={"area": changed})})
+
+
+def compare_limits(tasks: Sequence[Task], recipe: Recipe, limits: Iterable[str], cache: PressCache) -> None:
+    """Print both errors by each choice of the limits of one kind."""
+    print("\n".join(tables.EXCHANGE))
+    for chosen in limits:
+        recipes = {recipe.name: with_limits(recipe, chosen)}
+        print(tables.exchange(chosen, decided(tasks, recipes, [Practice()], cache)[Practice()]), flush=True)
+
+
 def main() -> None:
     """Inspect, print the tables, and write them where they are the result."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=300, help="sound fruit, and severely damaged ones, of each kind")
-    parser.add_argument("--others", type=int, help="mildly damaged fruit, and soft patches; a third of --count else")
+    parser.add_argument("--count", type=int, default=300, help="fruit of each kind and damage; a third with a patch")
     parser.add_argument("--kinds", nargs="+", type=Kind, choices=KINDS, default=KINDS)
-    parser.add_argument("--seeds", choices=SEEDS, default="judging")
+    parser.add_argument("--seeds", nargs="+", choices=SEEDS, default=["judging"])
     parser.add_argument("--recipes", type=Path, metavar="DIR", help="the folder of the recipes; else the shipped ones")
+    parser.add_argument("--limits", nargs="+", metavar="MM2,…", help="compare these limits of the one kind in --kinds")
     parser.add_argument("--processes", type=int, default=2)
     asked = parser.parse_args()
-    others = asked.others if asked.others is not None else asked.count // 3
-    counts = {SOUND: asked.count, Severity.SEVERE: asked.count, Severity.MILD: others, Severity.PATCH: others}
+    # No limit on the area finds a patch: a third of the fruit shows that well enough.
+    counts: dict[str, int] = dict.fromkeys((SOUND, Severity.SEVERE, Severity.MILD), asked.count)
+    counts[Severity.PATCH] = asked.count // 3
     tasks = [
-        Task(kind, str(group), asked.seeds, number)
+        Task(kind, str(group), seeds, number)
+        for seeds in asked.seeds
         for kind in asked.kinds
         for group, count in counts.items()
         for number in range(count)
     ]
     recipes: dict[str, Recipe] = {kind: find_recipe(kind, asked.recipes) for kind in asked.kinds}
     cache = PressCache(CACHE, asked.processes)
+    if asked.limits:
+        (kind,) = asked.kinds
+        two_groups = [task for task in tasks if task.group in {SOUND, Severity.MILD}]
+        compare_limits(two_groups, recipes[kind], asked.limits, cache)
+        return
     all_of_it = decided(tasks, recipes, [Practice()], cache)[Practice()]
     some = [task for task in tasks if task.number < OF_EACH_GROUP and task.group != Severity.PATCH]
     compared = decided(some, recipes, tables.PRACTICES.values(), cache)
@@ -88,7 +111,7 @@ def main() -> None:
     }
     for lines in sections.values():
         print("\n".join(lines), end="\n\n")
-    if asked.seeds == "judging" and set(asked.kinds) == set(KINDS):
+    if asked.seeds == ["judging"] and set(asked.kinds) == set(KINDS):
         write(DOCUMENT, sections)
         write(README, {"errors": sections["errors"]})
 

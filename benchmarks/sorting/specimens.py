@@ -12,9 +12,9 @@ from station.twin.fruit import Fruit, Kind, draw_fruit
 KINDS = (Kind.BLUEBERRY, Kind.RASPBERRY, Kind.STRAWBERRY)
 SOUND = "sound"
 GROUPS = (SOUND, *Severity)
-SEEDS = {"tuning": 20, "earlier": 21, "judging": 22}
-"""Sets of fruit that never meet: recipes are tuned on the first two and judged on the last, which no limit was chosen
-on. `earlier` was judged on until the strawberries' limits were chosen on it as well."""
+SEEDS = {"tuning": 20, "tuning-2": 21, "tuning-3": 22, "judging": 23}
+"""Sets of fruit that never meet: recipes are tuned on the others and judged on the last, which no limit was chosen on.
+The second and the third were judged on until the strawberries' limits were chosen on them as well."""
 
 _ZERO_SD_MM = 0.2
 _HABIT_PX, _HABIT_DEG = 10.0, 3.0

@@ -130,6 +130,17 @@ def spared(before: Iterable[Inspected], after: Iterable[Inspected], recipes: Map
     return lines
 
 
+def exchange(limits: str, inspected: Iterable[Inspected]) -> str:
+    """A line of how one error is exchanged for the other, below `EXCHANGE`.
+
+    Args:
+        limits: the area limits, mm².
+        inspected: sound and mildly damaged fruit of one kind, by one practice.
+    """
+    groups = {group: fruit for (_, group), fruit in _grouped(inspected).items()}
+    return _row(limits, *(share(groups.get(group, [])) for group in (SOUND, Severity.MILD)))
+
+
 def _step_s(recipe: Recipe) -> float:
     """Motion, settling and frames of one width step."""
     imaging = recipe.imaging
@@ -150,3 +161,7 @@ def _header(*names: object) -> list[str]:
 
 def _row(*cells: object) -> str:
     return "| " + " | ".join(str(cell) for cell in cells) + " |"
+
+
+EXCHANGE = _header("limits, mm²", "sound diverted", "mild damage passed")
+"""Head of the table whose lines `exchange` gives."""

@@ -1,6 +1,6 @@
 """Generator of files from the settings models: `python -m station.settings.export`, in a checkout.
 
-The JSON Schemas, the example configuration and the tables of fields in the documents; a test compares them.
+The JSON Schemas, the example configuration and the recipe guide's table of fields; a test compares them.
 """
 
 import json
@@ -10,7 +10,6 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from station.settings.configuration import Configuration
-from station.settings.environment import variable
 from station.settings.recipe import APPROVED_NAME, approved_list
 from station.settings.recipe_model import Recipe
 from station.settings.schema import Leaf, Node, expectation, leaves, resolved, schema_of
@@ -23,16 +22,15 @@ def exported(root: Path = ROOT) -> dict[Path, str]:
     """Return the content of each file.
 
     Args:
-        root: the checkout; of its documents the text around the tables is retained.
+        root: the checkout; of the recipe guide the text around the table is retained.
     """
-    recipe_guide, configuration_guide = root / "docs" / "recipes.md", root / "docs" / "configuration.md"
+    recipe_guide = root / "docs" / "recipes.md"
     return {
         root / "recipes" / "recipe.schema.json": json_schema(Recipe, "A recipe of the fruit-inspection station"),
         root / "recipes" / APPROVED_NAME: approved_list(root / "recipes"),
         root / "deploy" / "station.schema.json": json_schema(Configuration, "station.yaml"),
         root / "deploy" / "station.yaml": example(),
         recipe_guide: _with_table(recipe_guide.read_text(encoding="utf-8"), recipe_table()),
-        configuration_guide: _with_table(configuration_guide.read_text(encoding="utf-8"), configuration_table()),
     }
 
 
@@ -51,14 +49,7 @@ def recipe_table() -> str:
     """The recipe's fields as a Markdown table."""
     root = schema_of(Recipe)
     rows = [_row([f"`{_dotted(leaf)}`", *_columns(leaf, root)]) for leaf in leaves(root, into_lists=True)]
-    return "".join([_head("field", "title", "takes", "default", "meaning"), *rows])
-
-
-def configuration_table() -> str:
-    """The configuration's fields as a Markdown table, with their environment variables."""
-    root = schema_of(Configuration)
-    rows = [_row([f"`{_dotted(leaf)}`", f"`{variable(leaf.path)}`", *_columns(leaf, root)]) for leaf in leaves(root)]
-    return "".join([_head("field", "variable", "title", "takes", "default", "meaning"), *rows])
+    return "".join([_head("field", "takes", "default", "meaning"), *rows])
 
 
 def example() -> str:
@@ -89,10 +80,10 @@ def _section(node: Node, root: Node, depth: int) -> Iterator[str]:
 
 
 def _columns(leaf: Leaf, root: Node) -> list[str]:
-    """Return a field's title, accepted values, default and meaning."""
+    """Return a field's accepted values, default and meaning."""
     default = f"`{json.dumps(leaf.node['default'], ensure_ascii=False)}`" if "default" in leaf.node else "required"
     takes = "a list of the following" if _of_mappings(leaf, root) else str(expectation(leaf.node, root))
-    return [leaf.node.get("title", ""), takes, default, leaf.node.get("description", "")]
+    return [takes, default, leaf.node.get("description", "")]
 
 
 def _of_mappings(leaf: Leaf, root: Node) -> bool:

@@ -111,3 +111,9 @@ class TestTogether:
         doubtful = near()
         assert judge(together([doubtful, press()]), RECIPE).outcome == "PASS"
         assert judge(together([doubtful, doubtful]), RECIPE).reasons == (Reason.NEAR_LIMIT,)
+
+
+def test_a_lower_bound_of_both_kinds_counts_with_its_pixels():
+    bound = press((2.0, 10.0, 16.5, 30.0), Flag.CUT_BY_BORDER, Flag.LOWER_BOUND)
+    last = together((bound, press())).points[-1]
+    assert (last.area_mm2, last.area_px, last.flags) == (30.0, 42_000, frozenset())

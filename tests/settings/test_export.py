@@ -68,7 +68,7 @@ def test_the_example_with_nothing_commented_out_is_the_default(root, write):
 
 
 def test_the_table_lists_fields_inside_lists():
-    assert "| `damage.area[].area_mm2` | Area | a number above 0 and at most 260 mm² | required |" in recipe_table()
+    assert "| `damage.area[].area_mm2` | a number above 0 and at most 260 mm² | required |" in recipe_table()
 
 
 def test_a_model_made_in_python_says_what_contradicts(small, write):
