@@ -12,7 +12,7 @@ from pathlib import Path
 
 import cv2
 from fit import document
-from fit.cost import costs
+from fit.cost import costs, weighted
 from fit.evaluation import Trial
 from fit.parts import groups
 from fit.progress import report
@@ -60,10 +60,15 @@ seeds.
 
 
 def evaluate(runner: Runner) -> None:
-    """Write the shipped constants' results on both parts."""
-    lines = [COST.strip()]
-    for part, name in enumerate(("To fit on", "Held back")):
-        lines += ["", f"### {name}", "", *document.evaluation_table(runner.shipped(part), runner.parts[part])]
+    """Write the shipped constants' results on the part held back; `--check` alone prints both parts."""
+    fitted = weighted(costs(runner.shipped(0), runner.parts[0]), runner.parts[0])
+    lines = [
+        COST.strip(),
+        "",
+        f"On the part to fit on the cost is {fitted:.4f}; on the one held back:",
+        "",
+        *document.evaluation_table(runner.shipped(1), runner.parts[1]),
+    ]
     document.write_section("Data sets and cost", lines)
 
 
@@ -73,12 +78,14 @@ def constants(runner: Runner, cache: Path) -> None:
     store(cache / "sensitivity.json", found)
     lines = [
         "Change of the cost, on the part to fit on, when one constant is changed; the recipe's parameters are at their",
-        f"defaults. `*` marks an effect above {LEAST_EFFECT:g} and above {ERRORS:g} standard errors. What suffers is",
-        "the data set with the largest share, with the change of its own cost.",
+        f"defaults. `*` marks an effect above {LEAST_EFFECT:g} and above {ERRORS:g} standard errors; one without",
+        "is left out. What suffers is the data set with the largest share, with the change of its own cost.",
         "",
         *table(found),
         "",
         "### Changed far",
+        "",
+        "Those that matter only so.",
         "",
         *far_table(found),
     ]

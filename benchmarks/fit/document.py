@@ -13,9 +13,9 @@ from fit.parts import Groups
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "robust-constants.md"
 TITLE = "# The robust method's constants"
 INTRODUCTION = """
-Written by `./run bench fit --all`; each of its parts writes its own section and keeps the others. Constants are in
-`station/vision/constants.py`, stages in `station/vision/robust.py`, and what each stage does in `docs/robust.md`.
-Check a change with `./run bench fit --check NAME=VALUE`, in about a minute: it prints what the change costs.
+Written by `./run bench fit --all`, section by section. The source, `station/vision/constants.py`, has each constant's
+unit, meaning and origin; [the robust method](robust.md) what each stage does; [For
+developers](developer.md#change-a-constant-of-the-robust-method) how to check a change.
 """
 COLUMNS = (
     "data set",

@@ -146,39 +146,29 @@ def store(path: Path, found: list[Sensitivity]) -> None:
 
 
 def table(found: list[Sensitivity]) -> list[str]:
-    """The constants' table, the largest effect first."""
-    origins = {one.name: one.metadata for one in fields(Constants)}
+    """The table of the constants that matter, the largest effect first."""
     lines = [
-        f"| constant | value | unit | grid | meaning | origin | at x{NEAR[0]:g} | at x{NEAR[1]:g} | what suffers |",
-        "|---|---|---|---|---|---|---|---|---|",
+        f"| constant | value | at x{NEAR[0]:g} | at x{NEAR[1]:g} | what suffers |",
+        "|---|---|---|---|---|",
     ]
     for row in found:
-        own = origins.get(row.name, {"unit": "", "grid": "", "meaning": "see the recipe", "origin": "recipe"})
-        worst = max(row.near, key=lambda change: change.effect)
-        cells = " | ".join(_cell(change) for change in row.near)
-        texts = " | ".join(own[key].replace("|", "/") for key in ("unit", "grid", "meaning", "origin"))
-        lines.append(f"| `{row.name}` | {row.value:g} | {texts} | {cells} | {worst.suffers} |")
-    return [*lines, "", *_summary(found)]
-
-
-def _summary(found: list[Sensitivity]) -> list[str]:
-    far = [row.name for row in found if not row.matters and row.matters_at_all]
-    never = [row.name for row in found if not row.matters_at_all]
-    listed = [", ".join(f"`{name}`" for name in names) or "none" for names in (far, never)]
-    return [
-        f"Matter when changed by a fifth (`*`): {sum(row.matters for row in found)} of {len(found)}.",
-        "",
-        f"Matter only when changed to {WIDE[0]:g} or {WIDE[1]:g} times ({len(far)}): {listed[0]}.",
-        "",
-        f"Do not matter even then, candidates for removal ({len(never)}): {listed[1]}.",
-    ]
+        if row.matters:
+            worst = max(row.near, key=lambda change: change.effect)
+            cells = " | ".join(_cell(change) for change in row.near)
+            lines.append(f"| `{row.name}` | {row.value:g} | {cells} | {worst.suffers} |")
+    never = [f"`{row.name}`" for row in found if not row.matters_at_all]
+    summary = (
+        f"Matter when changed by a fifth: {sum(row.matters for row in found)} of {len(found)}. Do not matter even at "
+        f"{WIDE[0]:g} or {WIDE[1]:g} times, candidates for removal ({len(never)}): {', '.join(never) or 'none'}."
+    )
+    return [*lines, "", summary]
 
 
 def far_table(found: list[Sensitivity]) -> list[str]:
-    """The effects of the far changes, of the constants that do not matter when changed by a fifth."""
+    """The effects of the far changes, of the constants that matter only so."""
     lines = [f"| constant | cost at x{WIDE[0]:g} | at x{WIDE[1]:g} | what suffers |", "|---|---|---|---|"]
     for row in found:
-        if row.wide is not None:
+        if row.wide is not None and row.matters_at_all:
             worst = max(row.wide, key=lambda change: change.effect)
             lines.append(f"| `{row.name}` | {' | '.join(_cell(one) for one in row.wide)} | {worst.suffers} |")
     return lines

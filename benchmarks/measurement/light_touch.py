@@ -160,7 +160,7 @@ def detection_table(presses: list[Beside]) -> list[str]:
     header = "| found of contacts of | " + " | ".join(f"{area:g} mm²" for area in LIGHT_AREAS_MM2)
     lines = [
         header + " | the slopes' response at 1 mm² | an observer's signal to noise there: median, least "
-        "| closed further than there when first found: median, most |",
+        "| further closing until first found: median, most |",
         "|---" * (len(LIGHT_AREAS_MM2) + 4) + "|",
     ]
     noise = {unit: noise_of_unit(unit) for unit in DETECTION_UNITS}
@@ -178,11 +178,10 @@ def detection_table(presses: list[Beside]) -> list[str]:
     return [
         *lines,
         "",
-        f"A light touch is looked for where the response is over {GATE:g}. The observer",
-        "knows the contact's place, shape and colours beforehand and asks only whether it is there: one known template",
-        "against the twin's own noise and drift, beyond columns' and rows' means and slow cosines. The method knows",
-        "none of these. The last column is of the fruit that have a contact of 1 mm²: by how much later than there the",
-        "touch is found. One count of the gripper's position is about 0.4 mm.",
+        f"A weak contact is searched for where the response is over {GATE:g}. The observer knows the contact's place,",
+        "shape and colours beforehand and decides only whether it is there: one known template against the twin's own",
+        "noise and drift, beyond columns' and rows' means and slow cosines. The method knows none of these. The last",
+        "column is of the fruit that have a contact of 1 mm²: by how much later than there the touch is found.",
         "",
         *more_frames_table(contacts),
         "",

@@ -114,7 +114,7 @@ def soft_table(seeds: Sequence[int] = SEEDS) -> list[str]:
     lines = [header, "|---|---|---|---|---|---|---|---|---|---|---|---|---|"]
     filling = tuple(str(kind) for kind in soft_bodies.FILLING)
     for name, kinds in (("all that fill the field", filling), *((kind, (kind,)) for kind in soft_bodies.KINDS)):
-        for way in (FOLLOWED, ALONE, PEER):
+        for way in (FOLLOWED, ALONE, *([PEER] if len(kinds) > 1 else [])):
             some = [one for one in presses if one.kind in kinds and one.way == way]
             lines.append(_row(name.replace("_", " "), way, some))
     return lines

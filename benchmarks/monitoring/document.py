@@ -10,24 +10,17 @@ _LABEL = re.compile(r"\{\{\s*(?:humanize\w* )?\$?(?:labels\.)?(\w+)[^}]*\}\}")
 
 
 def alerts() -> str:
-    """Every alert under its own heading."""
-    parts = []
+    """The table of alerts; consequence and action come with the alert itself."""
+    lines = ["| alert | severity, after | cause |", "| --- | --- | --- |"]
     for name, rule in alerts_of().items():
         notes = rule["annotations"]
         severity = rule["labels"]["severity"]
-        wait = ", after " + rule["for"] if "for" in rule else ""
-        link = notes["runbook"].removeprefix("docs/").replace('{{ reReplaceAll "_" "-" $labels.id }}', "alarms")
-        rows = [("cause", notes["cause"]), ("consequence", notes["consequence"]), ("action", notes["action"])]
-        rows = [(what, _LABEL.sub(lambda match: f"*{match[1]}*", text)) for what, text in rows]
-        table = "".join(f"| {what} | {text} |\n" for what, text in rows)
         severity = "the alarm's own" if "{{" in severity else severity
-        more = (
-            f"[More]({link})"
-            if not link.startswith("monitoring.md")
-            else f"[More]({link.removeprefix('monitoring.md')})"
-        )
-        parts.append(f"### {name}\n\nSeverity: {severity}{wait}. {more}.\n\n|  |  |\n| --- | --- |\n{table}")
-    return "\n".join(parts)
+        wait = ", " + rule["for"] if "for" in rule else ""
+        link = notes["runbook"].removeprefix("docs/").replace('{{ reReplaceAll "_" "-" $labels.id }}', "alarms")
+        cause = _LABEL.sub(lambda match: f"*{match[1]}*", notes["cause"])
+        lines.append(f"| [{name}]({link.removeprefix('monitoring.md')}) | {severity}{wait} | {cause} |")
+    return "\n".join(lines)
 
 
 def with_part(text: str, name: str, part: str) -> str:

@@ -4,7 +4,7 @@ Grids: `working` is the image averaged down to 320 pixels on its long side, `hal
 and four. A length in pixels of one grid is written on that grid only. Origins: `fit` was chosen by
 `./run bench fit` on the data named there; `formula` follows from the source given; `measured` was read off real
 images; `resolution` is how finely something is computed, and finer changes nothing that the fit's data show.
-`docs/robust-constants.md` has them all as a table with what it costs to change each.
+`docs/robust-constants.md` has what it costs to change each.
 """
 
 from dataclasses import dataclass, field

@@ -114,4 +114,4 @@ def test_the_index_has_every_number_with_subject_status_and_date(records, rows):
 def test_the_index_explains_each_missing_number(records, rows):
     for number in set(rows) - set(records):
         subject, status, _ = rows[number]
-        assert "robust.md#history" in subject or status == "number never used"
+        assert "robust-method-history.md" in subject or status == "number never used"
