@@ -8,12 +8,11 @@ Exits 1 where a row does not hold.
 import argparse
 import asyncio
 import fcntl
-import itertools
 import json
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from reliability.clock import CannotDoError
@@ -30,16 +29,14 @@ MEASURED = ROOT / "benchmarks" / "reliability" / "measured.json"
 PAGE = ROOT / "docs" / "reliability.md"
 
 
-async def run_scenario(
-    scenario: Scenario, phases: Sequence[Phase], numbers: Iterator[int], logs: Path | None
-) -> list[Row]:
+async def run_scenario(scenario: Scenario, phases: Sequence[Phase], logs: Path | None) -> list[Row]:
     """Play one scenario on a station of its own, and go on with another one after a row that does not hold."""
     rows, left = list[Row](), list(phases)
     while left:
         with tempfile.TemporaryDirectory(prefix="faults-") as name:
             folder = Path(name)
             try:
-                async with running(folder, next(numbers), scenario) as rig:
+                async with running(folder, scenario) as rig:
                     while left:
                         rows.append(await play(rig, scenario, left.pop(0)))
                         print(told(rows[-1]), flush=True)
@@ -85,9 +82,9 @@ async def run_all(
     chosen: Sequence[Scenario], phases: Sequence[Phase], logs: Path | None, scenarios: Sequence[Scenario], *, kept: bool
 ) -> bool:
     """Play them one after the other. Whether all held."""
-    numbers, held = itertools.count(1), True
+    held = True
     for scenario in chosen:
-        rows = await run_scenario(scenario, [phase for phase in scenario.phases if phase in phases], numbers, logs)
+        rows = await run_scenario(scenario, [phase for phase in scenario.phases if phase in phases], logs)
         held &= not any(row.wrong for row in rows)
         if kept:
             keep(rows, scenarios)

@@ -163,7 +163,7 @@ async def rounds_of_one_station(seed: int, number: int) -> AsyncIterator[Round |
     chance, scenario = random.Random(seed), Scenario(name="kills", fault=None, expected=Expected(outcomes=("PASS",)))
     placing, place = chance.choice(("nest", "arm", "arm", "arm")), Path(tempfile.mkdtemp())
     kills, wrong, restarts = 0, False, Restarts()
-    async with running(place, seed, scenario, placing, LIMIT_MM2) as rig:
+    async with running(place, scenario, placing, LIMIT_MM2) as rig:
         for each in range(ROUNDS_A_STATION):
             made = await kill_in_round(rig, chance, restarts, seed, each)
             kills, wrong = kills + len(made.kills), bool(made.wrong)

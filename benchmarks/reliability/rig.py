@@ -5,6 +5,7 @@ import contextlib
 import json
 import os
 import random
+import secrets
 import signal
 import socket
 import subprocess
@@ -324,7 +325,6 @@ def _quick_recipes(folder: Path, measured: str, limit_mm2: float) -> Path:
 @contextlib.asynccontextmanager
 async def running(
     folder: Path,
-    number: int,
     scenario: Scenario,
     placing: Literal["nest", "arm"] = "nest",
     limit_mm2: float = 140.0,
@@ -333,7 +333,6 @@ async def running(
 
     Args:
         folder: an empty one.
-        number: another one for each station that this process starts.
         scenario: what will be played; the station is prepared for it.
         placing: the service's setting.
         limit_mm2: the recipe's, of the contact area.
@@ -343,7 +342,7 @@ async def running(
         StationError: a process does not start.
     """
     modbus, metrics, hmi, camera, console = _free_ports(5)
-    host = f"127.79.{os.getpid() % 250 + 1}.{number % 250 + 1}"
+    host = f"127.{96 + secrets.randbelow(16)}.{secrets.randbelow(250) + 1}.{secrets.randbelow(250) + 1}"
     file = folder / "station.yaml"
     values = {
         "home": str(folder / "home"),

@@ -2,8 +2,6 @@
 
 import asyncio
 import contextlib
-import itertools
-import os
 from collections.abc import AsyncIterator, Awaitable, Callable
 
 import pytest
@@ -13,8 +11,7 @@ from station.settings.arm import ArmSettings
 from station.twin.clock import SteadyClock
 from station.twin.faults import FaultBoard
 from station.twin.ur.controller import UrController, arm_faults
-
-_numbers = itertools.count(1)
+from tests.hosts import fresh_host
 
 
 class SkippingClock:
@@ -50,12 +47,6 @@ class Bench:
             "link_lost_after_s": 2.0,
         }
         return ArmSettings.model_validate(base | changes)
-
-
-def fresh_host() -> str:
-    """A loopback address that no other test has: the ports are fixed, so the address tells controllers apart."""
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    return f"127.{10 + worker}.{os.getpid() % 250}.{2 + next(_numbers) % 250}"
 
 
 @pytest.fixture

@@ -2,8 +2,6 @@
 
 import asyncio
 import contextlib
-import itertools
-import os
 import signal
 import subprocess
 import sys
@@ -23,9 +21,9 @@ from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import find_recipe
 from station.studies.simulated_rig import SimulatedRig
 from station.twin.console import ask
+from tests.hosts import fresh_host
 
 UNIT = Unit("T0001", "drawn DIGIT", simulated=True)
-_NUMBERS = itertools.count(1)
 
 
 @pytest.fixture(autouse=True)
@@ -96,7 +94,7 @@ class Site:
 @contextlib.contextmanager
 def running_twin(folder: Path, port: int, *, bench: bool) -> Iterator[Site]:
     """A twin in a process of its own with the ball in its nest."""
-    host = f"127.78.{os.getpid() % 250 + 1}.{next(_NUMBERS) % 250 + 1}"
+    host = fresh_host()
     configuration = folder / "station.yaml"
     configuration.write_text(
         f"home: home\nservice: {{bench: {str(bench).lower()}, patience: 20.0}}\n"

@@ -1,8 +1,6 @@
 """A whole simulated cell in a process of its own, and the station's command line against it."""
 
 import contextlib
-import itertools
-import os
 import signal
 import socket
 import subprocess
@@ -15,13 +13,7 @@ from typing import Any
 import pytest
 
 from station.twin.console import ask
-
-_NUMBERS = itertools.count(1)
-
-
-def own_host() -> str:
-    """A loopback address that no other test uses at the same time: a UR controller's ports are fixed."""
-    return f"127.77.{os.getpid() % 250 + 1}.{next(_NUMBERS) % 250 + 1}"
+from tests.hosts import fresh_host
 
 
 @dataclass
@@ -44,11 +36,6 @@ class Cell:
         return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)
 
 
-@pytest.fixture(name="own_host")
-def own_host_fixture() -> Callable[[], str]:
-    return own_host
-
-
 @contextlib.contextmanager
 def begun_cells(folder: Path) -> Iterator[Callable[..., Cell]]:
     """Starts a twin with the arguments given; all are ended at the end.
@@ -58,7 +45,7 @@ def begun_cells(folder: Path) -> Iterator[Callable[..., Cell]]:
     cells: list[Cell] = []
 
     def make(*arguments: object) -> Cell:
-        host = own_host()
+        host = fresh_host()
         configuration = folder / f"station_{len(cells)}.yaml"
         configuration.write_text(
             f"arm: {{host: {host}}}\n"

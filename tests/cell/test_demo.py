@@ -10,6 +10,8 @@ import sys
 import psutil
 import pytest
 
+from tests.hosts import fresh_host
+
 ROW = re.compile(
     r"^(?P<number>\d+) +(?P<trigger>\d+) +(?P<record>\d+) +(?P<fruit>\w+)( \(damaged\))? "
     r".*?\b(?P<outcome>PASS|FAIL|NO_RESULT)\b"
@@ -17,10 +19,10 @@ ROW = re.compile(
 
 
 @pytest.fixture
-def demo(tmp_path, unused_ports, own_host):
+def demo(tmp_path, unused_ports):
     """Starts the demonstration with addresses of its own and the patience of a busy machine."""
     modbus, metrics, hmi, camera, console = unused_ports(5)
-    host = own_host()
+    host = fresh_host()
     (tmp_path / "station.yaml").write_text(
         f"modbus: {{port: {modbus}}}\nmetrics: {{port: {metrics}}}\nhmi: {{port: {hmi}}}\n"
         f"arm: {{host: {host}, stale_after_s: 1.0, link_lost_after_s: 4.0, watchdog_hz: 0.5}}\n"

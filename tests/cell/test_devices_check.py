@@ -9,6 +9,7 @@ from station.messages import arm as arm_messages
 from station.messages import camera as camera_messages
 from station.messages import gripper as gripper_messages
 from station.messages.message import verbatim
+from tests.hosts import fresh_host
 
 DEVICES = ("arm controller", "arm RTDE", "arm programs", "gripper", "camera")
 
@@ -91,8 +92,8 @@ def test_without_a_twin_nothing_is_usable_and_nothing_hangs(make_cell):
         ),
     ],
 )
-def test_a_sites_wrong_addresses_are_named_with_what_to_correct(own_host, tmp_path, arm, gripper, said):
-    nobody = own_host()
+def test_a_sites_wrong_addresses_are_named_with_what_to_correct(tmp_path, arm, gripper, said):
+    nobody = fresh_host()
     file = tmp_path / "station.yaml"
     file.write_text(
         f"arm: {{host: {arm}}}\ngripper: {gripper}\n".replace("{nobody}", nobody)

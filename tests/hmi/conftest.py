@@ -49,6 +49,7 @@ from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
 from station.settings.recipe import load_recipes
 from station.twin.console import ask as ask_twin
+from tests.hosts import fresh_host
 
 PATIENCE_S = 60.0
 ADMIN, ADMIN_PIN = "admin", "482915"
@@ -241,7 +242,7 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
     """One station for all tests of this folder; each test leaves it ready, or makes it so."""
     folder = tmp_path_factory.mktemp("cell")
     modbus, metrics, hmi, camera, console = free_ports(5)
-    host = f"127.82.{os.getpid() % 250 + 1}.1"
+    host = fresh_host()
     values = {
         "home": str(folder / "home"),
         "recipes_folder": str(quick_recipes(folder / "recipes")),

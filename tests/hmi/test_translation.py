@@ -52,7 +52,7 @@ NO_PAGES = {
     "/jobs/{job}/show/{name}",
 }
 """Parts of pages, pictures, streams and files."""
-IN_THEIR_OWN_TESTS = {"/alarms/{alarm}", "/jobs/{job}", "/maintenance/configuration"}
+IN_THEIR_OWN_TESTS = {"/alarms/{alarm}", "/jobs/{job}", "/maintenance/configuration", "/maintenance/setup"}
 IN_TEMPLATES = re.compile(r"""\bt\(\s*["']([a-z_]+\.[a-zA-Z_.-]+)["'](?=\s*[,)])""")
 IN_CODE = re.compile(r"""(?:text\(|Problem\(\d+, |UserStoreError\()["']([a-z_]+\.[a-z_]+)["']""")
 

@@ -49,6 +49,7 @@ from station.settings.recipe import recipe_files
 from station.settings.recipe_text import with_values
 from station.twin.console import ask
 from station.vocabulary import Reason
+from tests.hosts import fresh_host
 
 PATIENCE_S = 120.0
 LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
@@ -58,7 +59,6 @@ MEASURED = frozenset(list(Reason)[: list(Reason).index(Reason.REFERENCE_BAD)]) -
 """The reasons that the fruit itself gives, after some steps."""
 _KEPT: list[int] = []
 """Processes of the site, which all modules share."""
-_NUMBERS = itertools.count(1)
 T = TypeVar("T")
 
 
@@ -224,7 +224,7 @@ def nothing_left_by_the_module() -> Iterator[None]:
 @pytest.fixture(scope="package")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     folder = tmp_path_factory.mktemp("site")
-    host = f"127.79.{os.getpid() % 250 + 1}.{next(_NUMBERS) % 250 + 1}"
+    host = fresh_host()
     file, port = folder / "station.yaml", free_port()
     values = {
         "home": str(folder / "h"),

@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import os
 import signal
 import socket
 import subprocess
@@ -16,6 +15,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from hmi.web.user_store import UserStore
 from tests.hmi_pages.conftest import PATIENCE_S, PIN, Person, begun, free_port, quick_recipes
+from tests.hosts import fresh_host
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -28,7 +28,7 @@ class Fresh:
     """A fresh installation; its devices, and what a person does at its command line."""
 
     def __init__(self, folder: Path) -> None:
-        host, self.port = f"127.79.{os.getpid() % 250 + 1}.251", free_port()
+        host, self.port = fresh_host(), free_port()
         self.file, self.folder, self.console = folder / "station.yaml", folder, ""
         values = {
             "home": str(folder / "home"),

@@ -1,7 +1,6 @@
 """A real Prometheus scrapes a demonstration, which tells a real PostgreSQL: whatever is asked is answered."""
 
 import math
-import os
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families as parse
@@ -11,6 +10,7 @@ from benchmarks.monitoring.asking import panels, promql, rules, sql, used
 from benchmarks.monitoring.month import LINKS, PHASES
 from benchmarks.monitoring.site import STATION, demonstration
 from station.runtime.observability.metrics_table import TABLE, exposed_name
+from tests.hosts import fresh_host
 
 FRUITS = 3
 
@@ -47,7 +47,7 @@ def empty(server, begin, end):
 
 @pytest.mark.timeout(600)
 def test_every_question_is_answered_and_no_metric_is_unused(promtool, postgresql_programs, tmp_path):
-    host = f"127.89.{os.getpid() % 250 + 1}.1"
+    host = fresh_host()
     with (
         postgres.throwaway(postgresql_programs) as server,
         demonstration(tmp_path, server, FRUITS, host) as site,

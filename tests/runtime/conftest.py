@@ -42,11 +42,11 @@ from station.settings.configuration import Configuration, load_configuration
 from station.settings.plc import line_endpoint
 from station.settings.recipe import load_recipes
 from station.twin.process import Twin, TwinOptions
+from tests.hosts import fresh_host
 
 PATIENCE_S = 60.0
 LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
 NUMBERS = {"strawberry": 1, "blueberry": 2, "raspberry": 3}
-_HOSTS = itertools.count(1)
 
 
 def free_port() -> int:
@@ -189,7 +189,7 @@ def settings_file(tmp_path: Path) -> Callable[..., Path]:
     """Write a station.yaml for addresses of its own; the station's patience is that of a busy machine."""
 
     def write(**service: Any) -> Path:
-        host = f"127.78.{os.getpid() % 250 + 1}.{next(_HOSTS) % 250 + 1}"
+        host = fresh_host()
         values = {
             "home": str(tmp_path / "home"),
             "recipes_folder": str(quick_recipes(tmp_path / "recipes")),

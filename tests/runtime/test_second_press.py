@@ -44,7 +44,9 @@ def test_a_fruit_that_the_border_cut_at_the_first_press_passes_with_the_second(i
     assert outcome.outcome == "PASS", judged.explanation
     assert judged.measures["presses"] == 2
     assert judged.first_press_findings.id == CUT_BY_BORDER.id
-    assert not any("cut_by_border" in point.flags for point in judged.curve)
+    decided = [point.flags for point in judged.curve if point.closing_mm < judged.closing_mm + 0.1]
+    assert decided, judged.curve
+    assert not any("cut_by_border" in flags for flags in decided), judged.curve
     assert judged.phases_s["opening_again"] > 0
     shown = format_inspection(record)
     assert "Pressed twice, since the first press did not decide: At " in shown

@@ -1,7 +1,6 @@
 """The simulated grader: what the PLC is told of the length of the fruit that the twin lays."""
 
 import asyncio
-import os
 
 import pytest
 
@@ -10,6 +9,7 @@ from station.settings.camera import TwinCameraSettings
 from station.settings.gripper import GripperSettings
 from station.twin.damage import DAMAGES, Severity
 from station.twin.process import Twin, TwinOptions
+from tests.hosts import fresh_host
 
 RECIPES = {"strawberry": 1, "blueberry": 2}
 
@@ -26,7 +26,7 @@ def test_a_grader_errs_evenly_within_its_bounds_in_tenths():
 
 @pytest.mark.parametrize("graded", [True, False])
 def test_the_length_is_of_the_fruit_that_the_twin_has_laid(graded, unused_port):
-    host = f"127.79.{os.getpid() % 250 + 1}.1"
+    host = fresh_host()
     gripper = GripperSettings.model_validate({"urcap": {"host": host}, "modbus_rtu": {"host": host}})
     camera = TwinCameraSettings(host=host, port=unused_port)
 
