@@ -24,9 +24,10 @@ STALLED_S = 10.0
 """A client that does not take its response for so long is disconnected."""
 WAITING = 128
 """Connections that the kernel keeps for us to accept."""
-ADMITTED_AT_ONCE = 4
-"""Connections accepted before those that exist have their turn. A request takes some five turns until it is known here:
-were as many accepted meanwhile as an address has places, they would displace the connection that it came by."""
+ADMITTED_AT_ONCE = 1
+"""Connections accepted before those that exist have their turn. A client takes some milliseconds to speak, and its
+request some five turns until it is known here: were as many accepted meanwhile as an address has places, they would
+displace the connection that it came by."""
 _TCP_INFO_BYTES_RECEIVED = slice(128, 136)
 """In tcp_info of linux/tcp.h."""
 
