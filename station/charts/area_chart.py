@@ -14,6 +14,8 @@ from station.charts.axis import Axis
 
 STYLE_FILE = Path(__file__).with_name("area_chart.css")
 _REPORT_STYLE = Path(__file__).with_name("report.css")
+_LEAST_SHOWN_MM2 = 0.05
+"""Less is lost in the one digit behind the decimal sign."""
 _ROOM = 1.04
 """Beyond the largest value, so that its sign is not at the edge."""
 
@@ -123,7 +125,7 @@ def area_chart(
         parts.append(f'<text class="limit-name" x="{left + text / 3:.1f}" y="{at - 5:.1f}">{words}</text>')
     parts.append(_limits(limits, x, y, text))
     own = [point for curve in curves if curve.kind == "own" for point in curve.points]
-    parts += [_limit_name(each, own, x, y, text, f"{texts.limit} {number(each.area_mm2, 0)}") for each in limits]
+    parts += [_limit_name(each, own, x, y, text, f"{texts.limit} {_short(each.area_mm2, number)}") for each in limits]
     parts.append(_legend(texts.legend, left, high, text))
     whole = high + round(1.5 * text * len(texts.legend))
     return Markup(  # noqa: S704 (numbers, our own classes, and escaped texts)
@@ -216,6 +218,12 @@ def _limit_name(limit: Limit, own: Sequence[tuple[float, float]], x: Axis, y: Ax
     at_y = y(limit.area_mm2) + (1.1 if nearest[1] > limit.area_mm2 else -0.75) * text
     place = f'x="{at_x:.1f}" y="{at_y:.1f}" text-anchor="middle"'
     return f'<text class="limit-name" {place}>{escape(words)}</text>'
+
+
+def _short(area_mm2: float, number: Callable[[float, int], str]) -> str:
+    """Format a limit's area with the one digit that it may have: 96.5 is neither 96 nor 97, and 98 is no 98.0."""
+    whole = abs(area_mm2 - round(area_mm2)) < _LEAST_SHOWN_MM2
+    return number(area_mm2, 0 if whole else 1)
 
 
 def _legend(legend: Sequence[tuple[Kind | Mark, str]], left: float, high: float, text: int) -> str:

@@ -63,7 +63,7 @@ def test_a_limit_is_named_with_its_area_where_the_curve_does_not_pass(area_mm2, 
     limits = [Limit(3.0, 50.4), Limit(3.0, 80.0, former=True)]
     chart = area_chart([Curve("own", [(0.0, 0.0), (3.0, area_mm2)], ("point", "decided"))], limits, Texts("x"))
     (name,) = shapes(chart, "limit-name")
-    assert name.text == "limit 50"
+    assert name.text == "limit 50.4"
     assert (float(name.attrib["y"]) < start(shapes(chart, "limit")[0])[1]) == above
     (ring,) = shapes(chart, "mark-decided")
     point = shapes(chart, "mark-point")[-1]
@@ -95,3 +95,8 @@ def test_a_document_contains_its_style_and_is_the_same_for_the_same_input():
 def test_a_sparkline_leaves_out_what_was_not_measured(areas):
     line = next(iter(ET.fromstring(spark(areas))))
     assert len(line.attrib["points"].split()) == sum(area is not None for area in areas)
+
+
+@pytest.mark.parametrize(("area_mm2", "words"), [(96.5, "limit 96.5"), (98.0, "limit 98"), (85.26, "limit 85.3")])
+def test_a_limit_is_named_as_exactly_as_it_was_chosen(area_mm2, words):
+    assert f">{words}<" in area_chart([], [Limit(3.0, area_mm2)], Texts("x"))
