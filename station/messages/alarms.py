@@ -210,11 +210,11 @@ CONFIGURATION_BROKEN = AlarmTexts(
     ),
 )
 RECIPE_BROKEN = AlarmTexts(
-    define("alarm.cause.recipe_broken", "A recipe's file has an error."),
+    define("alarm.cause.recipe_broken", "A recipe's file has an error or is not approved."),
     define("alarm.consequence.recipe_broken", "The recipe's last good version is used, or it cannot be chosen."),
     define(
         "alarm.action.recipe_broken",
-        "Correct the line that the detail names; `station recipes check` reports whether it is good.",
+        "Correct the line that the detail names, or have the draft approved; `station recipes check` reports the rest.",
     ),
 )
 NO_RECIPE = AlarmTexts(
