@@ -23,10 +23,12 @@ from markupsafe import Markup
 
 from hmi.web.folders import HMI
 from hmi.web.text import texts
+from station.messages import recipes
 from station.messages.message import ENGLISH, VERBATIM, Definition, Message, Renderer, fields
 from station.settings.hmi import Language
 
 SOURCE: Language = "en"
+_FIGURE = re.compile(r"-?\d+\.\d+")
 _THIN_SPACE = "\u202f"
 NO_VALUE = "–"  # noqa: RUF001 (for a value that was not measured)
 
@@ -159,6 +161,15 @@ class Locale:
             return renderer(self.language).sentence(said)
         words = "" if said is None else str(said)
         return Markup('<span lang="en">{}</span>').format(words) if words and self.language != SOURCE else words
+
+    def reason(self, given: str) -> str:
+        """Translate a stored reason if the station itself gave it; a person's own text is unchanged."""
+        own = next((message for reason in recipes.OWN_REASONS if str(message := reason()) == given), None)
+        return given if own is None else self.sentence(own)
+
+    def figure(self, text: str) -> str:
+        """Write a number of a recipe's file with the language's decimal sign; any other text is shown as it is."""
+        return text.replace(".", self.decimal_sign) if _FIGURE.fullmatch(text) else text
 
     def number(self, value: float | None, digits: int = 0) -> str:
         """Format a number with the language's decimal sign and a thin space between thousands.

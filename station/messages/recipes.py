@@ -2,6 +2,12 @@
 
 from station.messages.message import Listed, Name, Nested, Number, define
 
+# Reasons that the station itself gives in a recipe's history and in the audit trail.
+REASON_ADOPTED = define("recipe.reason.adopted", "it was there when the recipes' history began")
+REASON_USED = define("recipe.reason.used", "the station inspected by it until now")
+REASON_SHIPPED = define("recipe.reason.shipped", "shipped with the station's software")
+OWN_REASONS = (REASON_ADOPTED, REASON_USED, REASON_SHIPPED)
+
 # At the start of a lot.
 MOVED = define(
     "recipe.moved",

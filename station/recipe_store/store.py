@@ -98,9 +98,7 @@ class RecipeStore:
             _adopt(connection, found, last_good)
             for file in self._to_ship(list(found.values()), read_revisions(connection)):
                 who = f"fruit-station {version('fruit-station')}"
-                store_approved(
-                    connection, file.text, file.recipe, Origin.SHIPPED, who, "shipped with the station's software"
-                )
+                store_approved(connection, file.text, file.recipe, Origin.SHIPPED, who, str(messages.REASON_SHIPPED()))
 
     def submit(self, name: str, person: Person) -> Revision:
         """Store the recipe's file as a draft for another person to approve.
@@ -236,12 +234,12 @@ def _adopt(connection: Connection, found: Mapping[str, ValidFile], last_good: Ma
     if _has_started(connection):
         return
     shipped = approved_by_distribution()
-    reason = "it was there when the recipes' history began"
+    reason = str(messages.REASON_ADOPTED())
     append_audit(connection, AuditEntry("station", "station", BEGAN, "recipes", reason))
     for name in sorted({*found, *last_good}):
         file, good = found.get(name), last_good.get(name)
         if good is not None and (file is None or file.recipe != good):
             text = good.model_dump_json(indent=2) + "\n"
-            store_approved(connection, text, good, Origin.ADOPTED, "station", "the station inspected by it until now")
+            store_approved(connection, text, good, Origin.ADOPTED, "station", str(messages.REASON_USED()))
         elif file is not None and shipped.get(name) != content_sha256(file.recipe):
             store_approved(connection, file.text, file.recipe, Origin.ADOPTED, "station", reason)
