@@ -83,6 +83,7 @@
         pauseMs = everyMs;
         await shown(part);
         if (headers.get("x-over")) {
+          part.dataset.over = "";
           break;
         }
       } catch {

@@ -1,6 +1,7 @@
 """Rows of the audit trail as sentences in the reader's language; their stored JSON is in `station audit show`."""
 
 import json
+import re
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ from station.messages import alarms
 from station.messages.alarms import AlarmTexts
 
 _MOST_DETAILS = 6
+_REVISION = re.compile(r"(\S+) revision (\d+)")
 _LONGEST_VALUE = 60
 _NO_DETAILS = frozenset({"argument", "done", "why", "text", "sha256", "configuration_sha256", "boot", "file", "status"})
 """Values that the sentence states, or that only a program compares."""
@@ -56,6 +58,8 @@ def _subject(row: AuditRowView, locale: Locale) -> str:
     kind, _, rest = row.subject.partition(" ")
     if kind == "alarm" and (known := _ALARMS.get(rest)):
         return str(locale.sentence(known.cause()))
+    if kind == "recipe" and (revision := _REVISION.fullmatch(rest)):
+        return locale.text("audit.recipe_revision", name=revision[1], n=revision[2])
     return rest if kind in {"recipe", "lot"} and rest else row.subject
 
 

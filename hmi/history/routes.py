@@ -41,6 +41,7 @@ ENTRY = Entry("history", "/history")
 DEADLINE_S = 20.0
 PAGE = 20
 _OUTCOMES = {"PASS": "pass", "FAIL": "fail", "NO_RESULT": "unjudged"}
+_LONGEST_GAP = 50
 _KEPT_STAGES = 3
 _BETWEEN_DIGITS = str.maketrans("", "", " ,.'\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{THIN SPACE}")
 """Separators of a number such as 4,711."""
@@ -164,10 +165,13 @@ async def image(hmi: HmiNow, sha256: Annotated[str, StringConstraints(pattern=r"
 async def inspection(request: Request, hmi: HmiNow, locale: LocaleNow, sequence: int) -> Response:
     """Show one inspection in full."""
     reply = await _inspection(hmi, sequence)
+    before, after = await _neighbours(hmi, sequence)
     return show(
         request,
         "inspection.html.j2",
         reply=reply,
+        before=before,
+        after=after,
         reasons=[(code, reason_message(code)) for code in reply.reasons],
         limit=_deciding_limit(reply),
         chart=_chart(reply, locale),
@@ -229,6 +233,17 @@ async def _inspection(hmi: Hmi, sequence: int) -> InspectionView:
     if not 0 < sequence < 2**32:
         raise Problem(404, "problem.not_found")
     return await hmi.past.inspection(sequence)
+
+
+async def _neighbours(hmi: Hmi, sequence: int) -> tuple[int | None, int | None]:
+    """Return the numbers of the fruit before and after one; None where there is none.
+
+    Numbers can be missing, after a power failure; the gap is passed unless it is longer than what is looked through.
+    """
+    later = (await hmi.past.find(Search(), _LONGEST_GAP, sequence + _LONGEST_GAP)).rows
+    earlier = (await hmi.past.find(Search(), 1, sequence)).rows
+    after = min((row.sequence for row in later if row.sequence > sequence), default=None)
+    return (earlier[0].sequence if earlier else None), after
 
 
 async def _recipes(hmi: Hmi) -> tuple[RecipeRow, ...]:

@@ -27,7 +27,7 @@ def curve(fruit: Fruit, locale: Locale) -> Markup:
 def trend(fruit: Sequence[FruitSummary], locale: Locale) -> Markup:
     """Draw the rejects among ten fruit, ten after ten, the newest at the right: failed below, not judged above."""
     buckets = [fruit[at : at + TREND_BUCKET] for at in range(0, len(fruit) - TREND_BUCKET + 1, TREND_BUCKET)][::-1]
-    width, height, left, low = 340, 86, 46, 62
+    width, height, left, low = 340, 86, 54, 62
     parts = []
     for share in (0.0, 1.0):
         at = low - share * _TREND_HIGH

@@ -41,6 +41,7 @@ def test_a_changed_limit_is_shown_and_fingerprints_are_not():
     approved = row("recipe.approved", "recipe strawberry revision 2", old={"sha256": "ab", "revision": 1},
                    new={"sha256": "cd", "revision": 2, "changes": "area: 98 → 85"})  # fmt: skip
     assert sentence(approved, {}, Locale("en")).what == "Approved the recipe strawberry revision 2."
+    assert "strawberry Revision 2 " in sentence(approved, {}, Locale("de")).what
     assert sentence(approved, {}, Locale("en")).details == ("revision: 1 → 2", "changes: area: 98 → 85")
 
 

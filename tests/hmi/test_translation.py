@@ -25,6 +25,8 @@ from station.messages import arm, camera, commands, gripper, judge, lots, outbox
 from station.messages.message import verbatim
 from station.settings.hmi import LANGUAGES
 from station.settings.recipe import load_recipes
+from station.vision.paper import PaperMethod
+from station.vision.robust import RobustMethod
 from station.vocabulary import Flag, PackmlState, Reason
 
 STATION = HMI.parent / "station"
@@ -149,6 +151,7 @@ def test_no_text_that_a_page_uses_is_missing():
     used |= {f"order.{order}" for order in OperatorCommandName} | {f"alarms.state.{state}" for state in AlarmState}
     used |= {f"nav.{entry.name}" for entry in entries()}
     used |= {f"inspection.flag_{flag}" for flag in Flag} | {f"maintenance.fault_{fault}" for fault in FrameFault}
+    used |= {f"inspection.stage_{stage}" for method in (PaperMethod, RobustMethod) for stage in method.stages}
     assert used <= set(texts()), used - set(texts())
     assert len(used) > 100
 
@@ -207,3 +210,25 @@ def test_the_browsers_wish_counts_after_the_persons():
     assert preferred(("en", "de", "es"), "", "fr-FR, es-MX;q=0.9, en;q=0.8") == "es"
     assert preferred(("en", "de", "es"), "de", "es") == "de"
     assert preferred(("de", "en"), "es", "fr") == "de"
+
+
+def test_the_stations_own_reasons_are_translated_and_a_persons_words_are_not():
+    assert Locale("de").reason(str(recipes.REASON_SHIPPED())) == "mit der Software der Station geliefert"
+    assert Locale("de").reason("softer fruit were let through") == "softer fruit were let through"
+    assert Locale("en").reason(str(recipes.REASON_ADOPTED())) == "it was there when the recipes' history began"
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"), [("96.5", "96,5"), ("-0.25", "-0,25"), ("98", "98"), ("1.9.3", "1.9.3"), ("robust", "robust")]
+)
+def test_a_recipes_number_has_the_readers_decimal_sign(text, shown):
+    assert Locale("es").figure(text) == shown
+
+
+def test_one_fruit_and_more_are_counted_rightly():
+    assert [Locale("es").text("chart.passed", n=n) for n in (1, 2)] == ["1 apta", "2 aptas"]
+
+
+def test_a_station_that_waits_out_of_production_is_not_called_ready():
+    for language in LANGUAGES:
+        assert Locale(language).text("packml.idle") != Locale(language).text("frame.ready")

@@ -28,6 +28,37 @@ PAGES = (
     "/maintenance/registers",
     "/maintenance/log",
 )
+CUT = """() => {
+  const found = [];
+  for (const text of document.querySelectorAll("svg text")) {
+    const [box, whole] = [text.getBoundingClientRect(), text.closest("svg").getBoundingClientRect()];
+    if (text.checkVisibility() && (box.left < whole.left - 1 || box.right > whole.right + 1)) {
+      found.push(`outside its chart: ${text.textContent}`);
+    }
+  }
+  for (const button of document.querySelectorAll(".button")) {
+    if (button.checkVisibility() && button.scrollWidth > button.clientWidth) {
+      found.push(`wider than its button: ${button.textContent}`);
+    }
+  }
+  const texts = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT);
+  while (texts.nextNode()) {
+    const node = texts.currentNode;
+    if (!node.parentElement.checkVisibility() || node.parentElement.closest("svg, .sr, .mono, pre, option")) {
+      continue;
+    }
+    for (const word of node.data.matchAll(/\\p{L}{4,}/gu)) {
+      const range = document.createRange();
+      range.setStart(node, word.index);
+      range.setEnd(node, word.index + word[0].length);
+      if (new Set([...range.getClientRects()].map((each) => Math.round(each.top))).size > 1) {
+        found.push(`a word on two lines: ${word[0]}`);
+      }
+    }
+  }
+  return found;
+}"""
+"""Texts that a person cannot read whole."""
 SET_UP = "/maintenance/setup"
 """For administrators alone."""
 OVERFLOW = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
@@ -66,3 +97,23 @@ def test_pages_speak_the_browsers_language(orchard: Any, panel: Any, locale: Lan
         assert page.evaluate(OVERFLOW) == 0
     limit = person.go("/recipes/strawberry/edit").locator('[name="v:steps.closing_limit_mm"]')
     assert limit.input_value() == f"4{Locale(locale).decimal_sign}5"
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_no_text_is_cut_off(orchard: Any, panel: Any, language: Language) -> None:
+    soft = orchard.soft.sequence
+    paths = ("/", "/people", "/recipes", "/recipes/strawberry", f"/history/{soft}", f"/history/{soft}/step/1",
+             "/maintenance", "/maintenance/hand", "/maintenance/registers", "/maintenance/log")  # fmt: skip
+    person, viewer = panel("Ada", locale=language), panel(locale=language)
+    for each, path in [*((person, path) for path in paths), (viewer, "/people")]:
+        page = each.go(path)
+        page.locator("details > summary").evaluate_all("all => all.forEach((each) => { each.parentNode.open = true })")
+        for width, height in ((1280, 800), (390, 844)):
+            page.set_viewport_size({"width": width, "height": height})
+            assert page.evaluate(CUT) == [], f"{path} {width}"
+
+
+def test_a_disabled_choice_shows_its_label_alone(orchard: Any, panel: Any) -> None:
+    choice = panel().go("/maintenance/hand").locator(".choices input").first
+    assert choice.is_disabled()
+    assert choice.evaluate("each => getComputedStyle(each).opacity") == "0", "the browser's own sign is not seen"

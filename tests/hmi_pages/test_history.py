@@ -127,3 +127,24 @@ def test_a_table_and_a_lots_report_are_written_and_fetched(orchard: Any, panel: 
     page.get_by_role("button", name="Printable report").click()
     page.get_by_role("link", name="Open lot.html").click()
     expect(page.get_by_text("Lot LOT 1").first).to_be_visible()
+
+
+def test_the_arrows_lead_to_fruit_that_there_are(orchard: Any, panel: Any) -> None:
+    person = panel()
+    numbers = [outcome.sequence for outcome in orchard.fruit]
+    first, last = (
+        person.go(f"/history/{number}").locator(".steps-nav a").all_inner_texts()
+        for number in (min(numbers), max(numbers))
+    )
+    assert str(min(numbers) - 1) not in first
+    assert str(min(numbers) + 1) in first
+    assert str(max(numbers) + 1) not in last
+    assert str(max(numbers) - 1) in last
+
+
+def test_a_job_that_is_done_cannot_be_cancelled(orchard: Any, panel: Any) -> None:
+    page = panel("Quin").go("/history")
+    page.get_by_text("Tables and reports").click()
+    page.get_by_role("button", name="Printable report").click()
+    expect(page.get_by_role("link", name="Open lot.html")).to_be_visible()
+    expect(page.get_by_role("button", name="Cancel")).to_be_hidden()
