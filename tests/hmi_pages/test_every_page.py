@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from hmi.web.translation import Locale
 from station.settings.hmi import LANGUAGES, Language
@@ -117,3 +117,12 @@ def test_a_disabled_choice_shows_its_label_alone(orchard: Any, panel: Any) -> No
     choice = panel().go("/maintenance/hand").locator(".choices input").first
     assert choice.is_disabled()
     assert choice.evaluate("each => getComputedStyle(each).opacity") == "0", "the browser's own sign is not seen"
+
+
+def test_a_station_that_waits_out_of_production_is_idle_not_ready(orchard: Any, panel: Any, eventually: Any) -> None:
+    eventually(orchard.ready)
+    page = panel().go("/")
+    shown = page.locator(".activity-head, .station-state b")
+    expect(shown).to_have_text(["Ready", "Ready"])
+    with orchard.manual_mode():
+        expect(shown).to_have_text(["Idle", "Idle"])
