@@ -88,9 +88,17 @@ def test_one_touch_finds_todays_rejects(orchard: Any, panel: Any) -> None:
     page = panel().go("/history")
     page.get_by_role("link", name="Today", exact=True).click()
     page.get_by_role("link", name="Fail", exact=True).click()
-    shown = {int(text) for text in page.locator(".row-number").all_inner_texts()}
-    assert shown == {outcome.sequence for outcome in orchard.fruit if outcome.outcome == "FAIL"}
     assert page.locator(".chips [aria-current]").all_inner_texts() == ["Today", "Fail"]
+
+    def shown() -> set[int]:
+        return {int(text) for text in page.locator(".row-number").all_inner_texts()}
+
+    today = shown()
+    page.get_by_role("link", name="The day before").click()
+    before = shown()  # fruit inspected before a midnight that has just passed
+    assert not today & before
+    rejects = today | before
+    assert rejects == {outcome.sequence for outcome in orchard.fruit if outcome.outcome == "FAIL"}
     page.get_by_role("link", name="The day before").click()
     expect(page.get_by_text("Nothing was found.")).to_be_visible()
 
