@@ -29,6 +29,10 @@ def test_the_life_of_an_alarm(ready, operator, eventually):
         assert "camera" not in operator.text(".alarm-line")
         operator.page.get_by_role("button", name="Show again").click()
         operator.until(".alarm-line", "camera")
+        operator.open("/maintenance/image")
+        operator.until("main", "The camera sends no images: this is the last one.")
+        assert operator.page.locator(".live img.old").is_visible()
+        operator.open("/alarms")
     finally:
         ready.twin(do="clear", device="camera")
     operator.until(".alarm", "returned to normal, not acknowledged")
