@@ -256,7 +256,7 @@ async def log(request: Request, hmi: HmiNow, level: Annotated[Level, Query()] = 
     return show(request, "maintenance_log.html.j2", tab="log", lines=reply.lines[::-1], level=level)
 
 
-OLD_IMAGE_S = 2.0
+_OLD_IMAGE_S = 2.0
 """An image is shown as live up to this age, as are all values of the pages."""
 _FRAMES: OrderedDict[str, Picture] = OrderedDict()
 """The last live images: a page gets the address of one, and then fetches it."""
@@ -282,13 +282,14 @@ async def _live(hmi: Hmi, *, contact: bool) -> dict[str, Any]:
     try:
         reply = await hmi.gateway.request(GetLiveImage(contact=contact), LiveImage, deadline_s=5.0)
     except ChannelError as error:
-        return {"live_image": None, "why": error.message, "histograms": (), "place": "", "old_s": OLD_IMAGE_S}
+        return {"live_image": None, "why": error.message, "histograms": (), "place": ""}
     place = str(round(1e6 * reply.captured_s)) + ("1" if contact else "0")
     _FRAMES[place] = reply.picture
     while len(_FRAMES) > _KEPT_FRAMES:
         _FRAMES.popitem(last=False)
     drawn = tuple(zip(("red", "green", "blue"), map(histogram, reply.histogram), strict=True))
-    return {"live_image": reply, "why": "", "histograms": drawn, "place": place, "old_s": OLD_IMAGE_S}
+    is_old = reply.age_s > _OLD_IMAGE_S
+    return {"live_image": reply, "why": "", "histograms": drawn, "place": place, "is_old": is_old}
 
 
 async def _calibration(hmi: Hmi) -> dict[str, Any]:

@@ -12,7 +12,8 @@ from station.vocabulary import Reason
 from station.whatif.replay import recipe_of_snapshot, replay
 from station.whatif.stored import read_stored, snapshots
 
-OFF_MM = 2.0
+FRUIT, OFF_MM = 16, 3.0
+"""Where it lies, the border cuts it in every press; in the middle, in none, however long the flesh creeps."""
 
 
 @pytest.fixture
@@ -23,7 +24,7 @@ def inspected(bench, roomy):
         async def scenario():
             async with bench(roomy()) as cell:
                 await cell.choose("strawberry")
-                cell.lay("strawberry", 1, x_mm=OFF_MM)
+                cell.lay("strawberry", FRUIT, x_mm=OFF_MM)
                 await cell.line.ready()
                 openings = []
                 cell.at(State.OPENING_AGAIN, lambda: (openings.append(cell.phase), meanwhile(cell)))
@@ -38,15 +39,13 @@ def inspected(bench, roomy):
 
 @pytest.mark.timeout(180)
 def test_a_fruit_that_the_border_cut_at_the_first_press_passes_with_the_second(inspected, tmp_path):
-    outcome, record, openings = inspected(lambda cell: cell.lay("strawberry", 1))
+    outcome, record, openings = inspected(lambda cell: cell.lay("strawberry", FRUIT))
     judged = record.judged
     assert openings == [State.OPENING_AGAIN], judged.explanation
     assert outcome.outcome == "PASS", judged.explanation
     assert judged.measures["presses"] == 2
     assert judged.first_press_findings.id == CUT_BY_BORDER.id
-    decided = [point.flags for point in judged.curve if point.closing_mm < judged.closing_mm + 0.1]
-    assert decided, judged.curve
-    assert not any("cut_by_border" in flags for flags in decided), judged.curve
+    assert not any("cut_by_border" in point.flags for point in judged.curve)
     assert judged.phases_s["opening_again"] > 0
     shown = format_inspection(record)
     assert "Pressed twice, since the first press did not decide: At " in shown
