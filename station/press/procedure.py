@@ -116,9 +116,9 @@ async def onset(rig: Rig, recipe: Recipe, met: Met, measure: Measure) -> Onset:
     while True:  # back to where nothing touches, however faintly it began
         from_mm = min(from_mm, rig.widest_mm)
         await rig.open(from_mm)
-        seen_mm, before = await search.first_contact(from_mm)
+        met_mm, before, touching = await search.first_contact(from_mm)
         if before is not None or from_mm >= rig.widest_mm:
-            return await search.confirmed(seen_mm, before)
+            return await search.confirmed(met_mm, before, touching)
         from_mm += recipe.steps.step_mm
 
 
@@ -163,27 +163,35 @@ class _Search:
     def __init__(self, rig: Rig, recipe: Recipe, lowest_mm: float, measure: Measure) -> None:
         self._rig, self._recipe, self._lowest_mm, self._measure = rig, recipe, lowest_mm, measure
 
-    async def first_contact(self, from_mm: float) -> tuple[float, Step | None]:
-        """Return the width that was asked for where the gel was touched first, and the step before it."""
+    async def first_contact(self, from_mm: float) -> tuple[float, Step | None, Step]:
+        """Return the width asked for where the gel was touched first, the step before it, and that step."""
         width_mm, before = from_mm, None
         while width_mm >= self._lowest_mm:
-            seen = await self._measure(await self._glance(width_mm, -1, 1))
+            seen = await self._measure(await self._glance(width_mm))
             if stop.touches(seen):
-                return width_mm, before
+                return width_mm, before, seen.step
             if seen.step.move.held:
                 raise stop.nothing_touched(self._recipe, seen.step.move)
             width_mm, before = width_mm - self._rig.finest_step_mm, seen.step
         raise stop.nothing_touched(self._recipe)
 
-    async def confirmed(self, width_mm: float, before: Step | None) -> Onset:
-        """Confirm a contact by as many frames as a step has, at the same width; else search on."""
-        # Without the pause of a step: nothing creeps yet where nothing is pressed.
-        frames = self._recipe.imaging.frames_per_step
-        while not stop.touches(start := await self._measure(await self._glance(width_mm, 0, frames))):
-            width_mm, nearer = await self.first_contact(width_mm - self._rig.finest_step_mm)
-            before = nearer or before
-        return Onset(before, start)
+    async def confirmed(self, width_mm: float, before: Step | None, touching: Step) -> Onset:
+        """Confirm a contact by as many frames as a step has, at the same width; else search on.
 
-    async def _glance(self, width_mm: float, number: int, frames: int) -> Step:
-        move = await self._rig.close_to(width_mm)
-        return Step(number, move, await self._rig.frames(frames))
+        Args:
+            width_mm: that was asked for.
+            before: the last step without a contact.
+            touching: the first with one; its frame is the first of those that confirm it.
+        """
+        # Without the pause of a step: nothing creeps yet where nothing is pressed.
+        more = self._recipe.imaging.frames_per_step - 1
+        while True:
+            frames = (*touching.frames, *(await self._rig.frames(more) if more else ()))
+            start = await self._measure(Step(0, touching.move, frames))
+            if stop.touches(start):
+                return Onset(before, start)
+            width_mm, nearer, touching = await self.first_contact(width_mm - self._rig.finest_step_mm)
+            before = nearer or before
+
+    async def _glance(self, width_mm: float) -> Step:
+        return Step(-1, await self._rig.close_to(width_mm), await self._rig.frames(1))
