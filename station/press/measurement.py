@@ -4,6 +4,7 @@ from station.inspection.press import Measured
 from station.press.rig import MeasuredStep, Step
 from station.vision.contact import Contact, Image, Method
 from station.vision.press import PressTracker
+from station.vision.step import measure_step
 
 
 class PressMeasurement:
@@ -20,12 +21,14 @@ class PressMeasurement:
     def __init__(self, method: Method, least_confidence: float) -> None:
         self._method, self._least_confidence = method, least_confidence
         self._tracker: PressTracker | None = None
-        """Of the press that is followed, or of the next step alone."""
-        self._follows = False
+        """Of the press that is followed; None while each step is measured by itself."""
+        self._known: dict[int, tuple[Image, Contact]] = {}
+        """Frames that are measured already, each by itself, by their `id`."""
 
     def begin(self) -> None:
         """Measure each step by itself, against the same reference, after the jaws were opened."""
-        self._tracker, self._follows = None, False
+        self._tracker = None
+        self._known.clear()
 
     def follow(self, first: Contact) -> None:
         """Measure every later step as a step of one press.
@@ -33,7 +36,8 @@ class PressMeasurement:
         Args:
             first: the contact of the press's first step.
         """
-        self._tracker, self._follows = PressTracker(self._method, self._least_confidence, first), True
+        self._tracker = PressTracker(self._method, self._least_confidence, first)
+        self._known.clear()
 
     def prepare_next(self, image: Image) -> None:
         """Measure one frame of the next step while more are captured; `measure` then has less to do.
@@ -41,8 +45,10 @@ class PressMeasurement:
         Args:
             image: of the reference's shape; the same object comes with the step.
         """
-        self._tracker = self._tracker or PressTracker(self._method, self._least_confidence)
-        self._tracker.prepare_next(image)
+        if self._tracker is not None:
+            self._tracker.prepare_next(image)
+        else:
+            self._known[id(image)] = image, self._method.measure(image)
 
     def measure(self, step: Step) -> MeasuredStep:
         """Find the contact in a step's frames.
@@ -50,10 +56,14 @@ class PressMeasurement:
         Args:
             step: with frames of the reference's shape.
         """
-        tracker = self._tracker or PressTracker(self._method, self._least_confidence)
-        if not self._follows:
-            self._tracker = None
-        return MeasuredStep(step, step.image, tracker.measure_step(step.images))
+        if self._tracker is not None:
+            return MeasuredStep(step, step.image, self._tracker.measure_step(step.images))
+        known = {key: contact for key, (_, contact) in self._known.items()}
+        contact = measure_step(self._method, step.images, self._least_confidence, known=known)
+        self._known.clear()
+        if len(step.images) == 1:  # the frame that shows the contact first is one of those that confirm it
+            self._known[id(step.images[0])] = step.images[0], contact
+        return MeasuredStep(step, step.image, contact)
 
 
 def measured_point(contact: Contact, closing_mm: float, mm_per_px: float) -> Measured:

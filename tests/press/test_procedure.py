@@ -110,6 +110,34 @@ def test_an_onset_is_found_to_the_finest_step_and_the_step_before_it_is_handed_o
     assert rig.verbs[-1] == "release"
 
 
+def test_the_frame_that_shows_the_contact_first_is_one_of_those_that_confirm_it():
+    rig, observer = WrittenRig(), WrittenObserver(most=2)
+    asyncio.run(press(rig, BLUEBERRY, observer))
+    start, number = observer.steps[1], BLUEBERRY.imaging.frames_per_step
+    assert len(start.frames) == number
+    assert rig.verbs[-4:-1] == ["close", "frames 1", f"frames {number - 1}"], "the jaws are not moved to confirm it"
+
+
+def test_a_contact_that_is_not_confirmed_is_searched_on_from_there():
+    rig, observer = WrittenRig(fruit_mm=FRUIT_MM), WrittenObserver(most=2)
+    flashes = [True]
+
+    async def measure(step: Step) -> MeasuredStep:
+        """Return a contact where the fruit is touched, and in one single frame before."""
+        flash = step.number < 0 and step.move.width_mm < FRUIT_MM + 1.5 and bool(flashes)
+        flashes[:] = [] if flash else flashes
+        return cast(
+            "MeasuredStep", SimpleNamespace(step=step, contact=SimpleNamespace(is_firm=flash or step.image.any()))
+        )
+
+    observer.measure = measure  # type: ignore[method-assign]
+    asyncio.run(press(rig, BLUEBERRY, observer))
+    before, start = observer.steps
+    assert not flashes
+    assert before.move.width_mm >= FRUIT_MM > start.move.width_mm
+    assert before.move.width_mm - start.move.width_mm == pytest.approx(rig.finest_step_mm)
+
+
 def test_no_reference_is_taken_where_the_jaws_do_not_open():
     rig, observer = WrittenRig(opens_to_mm=50.0), WrittenObserver()
     with pytest.raises(JawsNotOpenError):
