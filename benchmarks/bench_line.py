@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 
 from bench_cycle import measured_while_closing
-from bench_triggers import CONFIGURATION, KINDS, Run, disagreements, inspect, table
+from bench_triggers import CONFIGURATION, KINDS, Run, disagreements, inspect, reasons, table
 
 from plc_interface.plc_simulator.program import Decision
 from station.commands.simulated_unit import calibrate_simulated_unit
@@ -76,7 +76,7 @@ def main() -> None:
     )
     rows = [row(kind, run, wrong, asked.a_minute) for kind, (run, wrong) in runs.items()]
     pace_table = "\n".join([f"| {' | '.join(names)} |", "|---" * len(names) + "|", *rows])
-    outcomes = table([each for run, _ in runs.values() for each in run.rows])
+    every_row = [each for run, _ in runs.values() for each in run.rows]
     text = f"""# A line at {asked.a_minute:g} fruit a minute
 
 Written by `./run bench line`. Fruit arrive every {60 / asked.a_minute:.1f} s, {DAMAGED_SHARE:.0%} of them damaged,
@@ -88,7 +88,9 @@ readings, the records and the metrics. On the twin; unverified on hardware.
 
 What was decided:
 
-{outcomes}
+{table(every_row)}
+
+{reasons(every_row)}
 
 Machine: {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}.
 """

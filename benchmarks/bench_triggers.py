@@ -91,7 +91,8 @@ async def inspect(
 
     def passed(passage: Passage, fruit: LaidFruit) -> None:
         rows.append((passage, fruit))
-        print(f"{len(rows):4} of {count}: {fruit.kind} {passage.decision}", file=sys.stderr)
+        why = ", ".join(passage.reasons)
+        print(f"{len(rows):4} of {count}: {fruit.kind} {passage.decision} {why}", file=sys.stderr)
 
     try:
         async with asyncio.timeout(120):

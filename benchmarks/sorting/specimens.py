@@ -12,9 +12,9 @@ from station.twin.fruit import Fruit, Kind, draw_fruit
 KINDS = (Kind.BLUEBERRY, Kind.RASPBERRY, Kind.STRAWBERRY)
 SOUND = "sound"
 GROUPS = (SOUND, *Severity)
-SEEDS = {"tuning": 20, "tuning-2": 21, "tuning-3": 22, "judging": 23}
+SEEDS = {"tuning": 20, "tuning-2": 21, "tuning-3": 22, "tuning-4": 23, "judging": 24}
 """Sets of fruit that never meet: recipes are tuned on the others and judged on the last, which no limit was chosen on.
-The second and the third were judged on until the strawberries' limits were chosen on them as well."""
+All but the first were judged on once, until something was chosen on them as well."""
 
 _ZERO_SD_MM = 0.2
 _HABIT_PX, _HABIT_DEG = 10.0, 3.0

@@ -30,7 +30,7 @@ _WINDOW_POINTS = 4
 _WINDOW_MM = 2.0
 LOWER_BOUNDS = {Flag.CUT_BY_BORDER, Flag.LOWER_BOUND}
 """Flags of an area that the contact surely reaches."""
-_EXCUSABLE = {Flag.LOW_CONFIDENCE, Flag.LOWER_BOUND}
+EXCUSABLE = {Flag.LOW_CONFIDENCE, Flag.LOWER_BOUND}
 """Doubts about a step that a later, trusted one settles."""
 _LEAST_NOISE = 0.02
 """Share of the largest area threshold below which a falling area is noise."""
@@ -101,7 +101,7 @@ class Evidence:
         kept = last.area_mm2 + self._uncertainty_mm2(last) <= threshold.area_mm2
         if last.closing_mm < threshold.closing_mm or not kept or self.doubts(last) or last in self.falling:
             return []
-        return [point for point in self.needed if self.doubts(point) and self.doubts(point) <= _EXCUSABLE]
+        return [point for point in self.needed if self.doubts(point) and self.doubts(point) <= EXCUSABLE]
 
     def bounds(self, point: Measured) -> bool:
         """Whether the area is surely no smaller: a contact that the border cuts, or whose edge was lost, is larger."""

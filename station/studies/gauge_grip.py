@@ -106,12 +106,15 @@ class FruitRig(StationaryRig):
         """Move to the nearest count of the gripper."""
         counts = round((self.counts_from_mm - width_mm) / self.finest_step_mm)
         self._width_mm = self.counts_from_mm - counts * self.finest_step_mm
+        self._now_s += _FRAME_S
         return Position(self._width_mm)
 
+    async def settle(self) -> None:
+        """Let the rest of a step's time pass."""
+        self._now_s += _STEP_S - _FRAME_S
+
     async def frames(self, number: int) -> tuple[SimulatedFrame, ...]:
-        """Image so often: one frame after the way of a count, several after the time of a step."""
-        if self._width_mm < self.widest_mm:
-            self._now_s += _FRAME_S if number == 1 else _STEP_S
+        """Image so often."""
         return self.images_at(self._width_mm, number)
 
     def images_at(self, width_mm: float, number: int) -> tuple[SimulatedFrame, ...]:

@@ -32,6 +32,12 @@ def at_3_mm(measured: Press) -> Measured:
     return measured.points[-1]
 
 
+def weak(area_mm2: float, confidence: float, *flags: Flag) -> Press:
+    """A press whose last point has a weak edge."""
+    measured = press((*SOUND_MM2[:-1], area_mm2), Flag.LOW_CONFIDENCE, *flags)
+    return replace(measured, points=(*measured.points[:-1], replace(at_3_mm(measured), confidence=confidence)))
+
+
 def near() -> Press:
     """A press whose area at 3 mm is within the limit, but not surely."""
     limit_mm2 = judge(press(), RECIPE).areas[0].limit_mm2
@@ -91,6 +97,44 @@ class TestTogether:
         one, other = press((30.0,), Flag.SATURATED), press((34.0,), Flag.CUT_BY_BORDER)
         [point] = together([one, other]).points
         assert (point.area_mm2, point.flags) == (34.0, {Flag.CUT_BY_BORDER})
+
+    @pytest.mark.parametrize(
+        ("areas_mm2", "confidences", "together_confidence"),
+        [
+            ((30.0, 30.0), (0.4, 0.4), 0.571),  # twice the odds of 0.4, 2 to 3
+            ((30.0, 30.6), (0.48, 0.32), 0.529),  # 2 % apart, so a spread of 1 %
+            ((30.0, 36.0), (0.4, 0.4), 0.299),  # a spread of 9 %: they hardly speak of the same
+            ((30.0, 30.0), (0.2, 0.2), 0.333),
+        ],
+    )
+    @pytest.mark.parametrize("lost", [(), (Flag.LOWER_BOUND,)])
+    def test_two_weak_edges_that_agree_are_trusted_as_far_as_both_say(
+        self, areas_mm2, confidences, together_confidence, lost
+    ):
+        one, other = (
+            weak(area_mm2, confidence, *lost) for area_mm2, confidence in zip(areas_mm2, confidences, strict=True)
+        )
+        for both in (together([one, other]), together([other, one])):
+            point = at_3_mm(both)
+            assert (point.area_mm2, point.area_px) == (max(areas_mm2), round(max(areas_mm2) * 1400))
+            assert point.confidence == pytest.approx(together_confidence, abs=0.001)
+            sure = together_confidence >= RECIPE.segmentation.robust.least_confidence
+            assert (Reason.LOW_CONFIDENCE in judge(both, RECIPE).reasons) is not sure
+
+    def test_two_weak_edges_of_a_sound_fruit_pass_and_of_a_damaged_one_do_not(self):
+        assert judge(together([weak(SOUND_MM2[-1], 0.4)] * 2), RECIPE).outcome == "PASS"
+        limit_mm2 = judge(press(), RECIPE).areas[0].limit_mm2
+        assert limit_mm2 is not None
+        verdict = judge(together([weak(0.9 * limit_mm2, 0.4), weak(1.02 * limit_mm2, 0.4)]), RECIPE)
+        assert verdict.outcome == "NO_RESULT", "judged by the larger one"
+
+    @pytest.mark.parametrize("other", [Flag.SATURATED, Flag.REFERENCE_MISMATCH, Flag.CUT_BY_BORDER, Flag.UNDECIDED])
+    def test_what_else_speaks_against_an_area_is_not_outweighed(self, other):
+        one, spoilt = weak(30.0, 0.4), weak(30.0, 0.4, other)
+        assert at_3_mm(together([one, spoilt])).flags == {Flag.LOW_CONFIDENCE, other}
+        assert at_3_mm(together([spoilt, one])) == at_3_mm(one)
+        nothing = weak(30.0, 0.0)
+        assert at_3_mm(together([nothing, one])) == at_3_mm(one)
 
     def test_closings_are_the_same_where_a_gripper_cannot_tell_them_apart(self):
         later = press((2.0, 10.0, 16.5, 30.0))
