@@ -1,7 +1,8 @@
 """What the operators' pages cost: a first load, the processor with three clients at 10 Hz, and the PLC's latency.
 
 Run with `./run bench hmi [SECONDS] [--rounds N]`: a whole demonstration with fruit after fruit; nobody looks, three
-panels take the page Run, three headless Chromiums show it on the same cores, in turn in every round. Writes
+panels take the page Run, ten readers page through the history and its images, three headless Chromiums show the page
+Run on the same cores, in turn in every round. Writes
 `docs/hmi-speed.md`. With `--pictures` it only draws the pages into `docs/images/hmi-*.png`.
 """
 
@@ -23,15 +24,18 @@ from bench_plc import built, free_port
 from looking.pictures import draw
 from looking.rounds import (
     BROWSERS,
+    HISTORY_READERS,
+    LOOKERS,
     NOBODY,
     PANELS,
+    READERS,
     Round,
     asking,
     browsers,
+    clients,
     compared,
     conditions_of,
     differences,
-    panels,
     table,
 )
 from playwright.sync_api import Browser, sync_playwright
@@ -149,7 +153,8 @@ def written(load: Load, found: dict[str, list[Round]], conditions: str) -> str:
     told = (
         "Written by `./run bench hmi`: a demonstration with fruit after fruit, the page Run updated "
         f"{1 / REFRESH_S:.0f} times a second. Three panels: clients in a process of their own that read the page's "
-        "stream and fetch its pictures, as separate panel computers do. Three browsers: headless "
+        "stream and fetch its pictures, as separate panel computers do. Ten readers: likewise, each opens a page of "
+        "the history or a fruit with all its images every second. Three browsers: headless "
         "Chromium that renders the pages on the station's own cores, the worst case."
     )
     first = (
@@ -167,12 +172,14 @@ def measure(running: Demo, browser: Browser, rounds: int, seconds: float) -> str
     parts = {name: running.part(name) for name in ("hmi", "service")}
     who = {
         NOBODY: contextlib.nullcontext,
-        PANELS: lambda: panels(host, port),
+        PANELS: lambda: clients("panels", LOOKERS, host, port),
+        READERS: lambda: clients("readers", HISTORY_READERS, host, port),
         BROWSERS: lambda: browsers(browser, host, port),
     }
+    metrics = f"http://{running.site.metrics.host}:{running.site.metrics.port}/metrics"
     with tempfile.TemporaryDirectory() as folder:
         plc = asking(built("load", Path(folder)), running.site.modbus.port)
-        found = compared(who, parts, plc, rounds, seconds)
+        found = compared(who, parts, plc, metrics, rounds, seconds)
     return written(load, found, conditions_of(rounds, seconds))
 
 

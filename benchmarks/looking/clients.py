@@ -1,12 +1,20 @@
-"""Panels without a browser: each takes the stream of the page Run and fetches what that page fetches.
+"""Clients without a browser: panels that show the page Run, or readers that page through the history.
 
-Run as a program: `clients.py HOST PORT COUNT`; says `looking` once all are told what is new, and goes on until ended.
+Run as a program: `clients.py HOST PORT COUNT {panels,readers}`; says `looking` once all are answered, and goes on until
+ended. A panel takes the page's stream and fetches what that page fetches; a reader opens a page a second.
 """
 
 import asyncio
 import re
 import sys
 
+PAGE_S = 1.0
+"""How long a reader looks at a page."""
+FRUIT, IMAGE, OLDER = (
+    re.compile(rb'"(/history/\d+)"'),
+    re.compile(rb"/history/image/\w+\.png"),
+    re.compile(rb"below=(\d+)"),
+)
 PART, PICTURE = re.compile(rb'data-live="([a-z._]+)"'), re.compile(rb"/fruit/\d+/picture\.svg")
 
 
@@ -46,16 +54,40 @@ async def look(host: str, port: int, looking: asyncio.Event) -> None:
     raise ConnectionError("the stream ended")
 
 
-async def main(host: str, port: int, count: int) -> None:
+async def page_through(host: str, port: int, looking: asyncio.Event) -> None:
+    """One reader: the history page by page, every fruit of a page with its images, from the newest to the oldest."""
+    head, _ = await fetched(host, port, "/history")
+    cookie = (re.search(rb"set-cookie: ([^;\r]+)", head, re.IGNORECASE) or [b"", b""])[1]
+
+    async def page(path: str) -> bytes:
+        head, body = await fetched(host, port, path, cookie)
+        if b" 200 " not in head.split(b"\r\n", 1)[0]:
+            raise ConnectionError(f"{path}: {head[:80]!r}")
+        await asyncio.sleep(PAGE_S)
+        return body
+
+    path = "/history"
+    while True:
+        rows = await page(path)
+        for fruit in dict.fromkeys(FRUIT.findall(rows)):
+            for image in dict.fromkeys(IMAGE.findall(await page(fruit.decode()))):
+                await fetched(host, port, image.decode(), cookie)
+            looking.set()
+        older = OLDER.search(rows)
+        path = f"/history?below={older[1].decode()}" if older else "/history"
+
+
+async def main(host: str, port: int, count: int, who: str) -> None:
     """Look until ended."""
     begun = [asyncio.Event() for _ in range(count)]
+    does = {"panels": look, "readers": page_through}[who]
     async with asyncio.TaskGroup() as group:
         for each in begun:
-            group.create_task(look(host, port, each))
+            group.create_task(does(host, port, each))
         for each in begun:
             await each.wait()
         print("looking", flush=True)
 
 
 if __name__ == "__main__":
-    asyncio.run(main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])))
+    asyncio.run(main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), sys.argv[4]))

@@ -1,10 +1,14 @@
-"""The PLC's latency and the processor with nobody looking, with panels and with browsers, in turn in every round."""
+"""The PLC's latency, the cycle's own time and the processor with nobody looking, with panels, readers and browsers.
+
+In turn in every round.
+"""
 
 import contextlib
 import os
 import statistics
 import subprocess
 import sys
+import urllib.request
 from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from pathlib import Path
@@ -13,9 +17,17 @@ from typing import NamedTuple
 import psutil
 from bench_plc import Figures, measured
 from playwright.sync_api import Browser
+from prometheus_client.parser import text_string_to_metric_families
 
-NOBODY, PANELS, BROWSERS = "no client", "three panels", "three browsers on these cores"
-LOOKERS = 3
+NOBODY, PANELS, READERS, BROWSERS = (
+    "no client",
+    "three panels",
+    "ten readers of the history",
+    "three browsers on these cores",
+)
+LOOKERS, HISTORY_READERS = 3, 10
+OWN_PHASES = ("awaiting_measure", "measuring_last", "judging", "recording_accept", "recording_reject")
+"""Of the cycle: what neither moves nor waits for a frame."""
 SCAN_US = 10_000
 MOST_PERCENT = 5
 """Wanted of three panels on two cores."""
@@ -29,19 +41,41 @@ class Round(NamedTuple):
     latency: Figures
     shares: dict[str, float]
     """By process, % of a core."""
+    own_ms: float
+    """Of the cycle: measuring, judging and recording, for which nothing moves, for each fruit."""
+
+
+def own_time(url: str) -> tuple[float, float]:
+    """The cycle's own seconds and its fruit since the station's start, by its metrics."""
+    with urllib.request.urlopen(url, timeout=10) as answer:
+        text = answer.read().decode()
+    seconds = fruit = 0.0
+    for family in text_string_to_metric_families(text):
+        for sample in family.samples:
+            if sample.name == "station_phase_duration_seconds_sum" and sample.labels["phase"].startswith(OWN_PHASES):
+                seconds += sample.value
+            fruit += sample.value if sample.name == "station_inspections_total" else 0.0
+    return seconds, fruit
 
 
 @contextlib.contextmanager
-def panels(host: str, port: int) -> Iterator[None]:
-    """Three panels without a browser, as on machines of their own: one process for all."""
-    command = [sys.executable, str(CLIENTS), host, str(port), str(LOOKERS)]
+def clients(who: str, count: int, host: str, port: int) -> Iterator[None]:
+    """Clients without a browser, as on machines of their own: one process for all.
+
+    Args:
+        who: `panels` or `readers`.
+        count: of them.
+        host: of the pages.
+        port: of the pages.
+    """
+    command = [sys.executable, str(CLIENTS), host, str(port), str(count), who]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         if process.stdout is None or process.stdout.readline() != "looking\n":
-            raise SystemExit("the panels were told nothing")
+            raise SystemExit(f"the {who} were told nothing")
         yield
         if process.poll() is not None:
-            raise SystemExit("the panels ended before the round did")
+            raise SystemExit(f"the {who} ended before the round did")
     finally:
         process.terminate()
         process.communicate(timeout=20)
@@ -66,6 +100,7 @@ def compared(
     conditions: dict[str, Callable[[], contextlib.AbstractContextManager[None]]],
     parts: dict[str, psutil.Process],
     load: Callable[[float], Figures],
+    metrics: str,
     rounds: int,
     seconds: float,
 ) -> dict[str, list[Round]]:
@@ -77,11 +112,14 @@ def compared(
         for name in names[first:] + names[:first]:
             with conditions[name]():
                 load(0.5)
+                own_s, fruit = own_time(metrics)
                 before = {part: sum(process.cpu_times()[:2]) for part, process in parts.items()}
                 latency = load(seconds)
                 after = {part: sum(process.cpu_times()[:2]) for part, process in parts.items()}
+                later_s, later_fruit = own_time(metrics)
             shares = {part: 100 * (after[part] - before[part]) / seconds for part in parts}
-            found[name].append(Round(latency, shares))
+            own_ms = 1000 * (later_s - own_s) / max(1.0, later_fruit - fruit)
+            found[name].append(Round(latency, shares, own_ms))
     return found
 
 
@@ -132,11 +170,12 @@ ROWS = (
     Row("the pages' process", "% of a core", 1, lambda each: each.shares["hmi"]),
     Row("the station's process", "% of a core", 1, lambda each: each.shares["service"]),
     Row("both processes", f"% of {CORES} cores", 1, lambda each: sum(each.shares.values()) / CORES),
+    Row("the cycle's own time a fruit: measuring, judging, recording", "ms", 1, lambda each: each.own_ms),
     Row("PLC's latency at a 10 ms scan, p50", "µs", 0, lambda each: each.latency.p50_us),
     Row("PLC's latency at a 10 ms scan, p99", "µs", 0, lambda each: each.latency.p99_us),
     Row("PLC's latency at a 10 ms scan, worst", "µs", 0, lambda each: each.latency.worst_us),
 )
-BOTH, P50, P99 = ROWS[2:5]
+BOTH, OWN, P50, P99 = ROWS[2:6]
 
 
 def table(found: dict[str, list[Round]]) -> list[str]:
@@ -158,7 +197,7 @@ def differences(found: dict[str, list[Round]]) -> list[str]:
     """Each condition against nobody looking, round by round, and what follows."""
     lines = ["| against no client | " + " | ".join(list(found)[1:]) + " |", "|---|" + "---|" * (len(found) - 1)]
     sentences = []
-    told = {row: {name: _against(found, name, row) for name in list(found)[1:]} for row in (BOTH, P50, P99)}
+    told = {row: {name: _against(found, name, row) for name in list(found)[1:]} for row in (BOTH, OWN, P50, P99)}
     for row, each in told.items():
         cells = [
             f"{_signed(one.median, row)} ({_signed(one.lowest, row)} to {_signed(one.highest, row)})"
@@ -169,7 +208,7 @@ def differences(found: dict[str, list[Round]]) -> list[str]:
     under = "less" if panels_cost.highest < MOST_PERCENT else "not surely less"
     sentences.append(f"- What three panels cost of both processes is {under} than {MOST_PERCENT} % of {CORES} cores.")
     for name in list(found)[1:]:
-        said = [_sentence(row, told[row][name]) for row in (P50, P99)]
+        said = [_sentence(row, told[row][name]) for row in (OWN, P50, P99)]
         sentences.append(f"- {name[0].upper()}{name[1:]}: {'; '.join(said)}.")
     confidence = told[P99][PANELS].confidence
     note = (
@@ -188,11 +227,11 @@ def _signed(value: float, row: Row) -> str:
 
 
 def _sentence(row: Row, told: Difference) -> str:
-    name = row.title.rpartition(" ")[2]
+    name = row.title.partition(":")[0] if row is OWN else row.title.rpartition(" ")[2]
     if not told.beyond_noise:
         return f"no difference of {name} beyond noise"
-    more = "later" if told.median > 0 else "earlier"
-    return f"{name} is {abs(told.median):,.0f} µs {more}, which is beyond noise"
+    more = "more" if told.median > 0 else "less"
+    return f"{name} is {abs(told.median):,.0f} {row.unit} {more}, which is beyond noise"
 
 
 def conditions_of(rounds: int, seconds: float) -> str:
