@@ -189,7 +189,7 @@ def late(limits: Deadlines, state: State, in_state_s: float, since_trigger_s: fl
 def _expected(recipe: Recipe, pace: Pace) -> dict[State, float]:
     """What a state takes where all is well; what is not listed takes a moment."""
     steps, imaging = recipe.steps, recipe.imaging
-    without_stop_mm = recipe.damage.deciding_closing_mm if steps.measured == "while_closing" else 0.0
+    without_stop_mm = recipe.damage.passing_closing_mm if steps.measured == "while_closing" else 0.0
     moving_s = max(steps.step_mm, without_stop_mm) / recipe.gripper.speed_mm_s + _RAMP_S
     capturing_s = imaging.frames_per_step / pace.frames_per_s
     opening_s = pace.stroke_mm / _SLOWEST_OPENING_MM_S + _RAMP_S

@@ -5,7 +5,7 @@
 | approaching | at the first frame with a firm contact | `touches` |
 | approaching | below the smallest expected width, or held by what the gel does not show | `nothing_touched` |
 | moving without a stop | as a measurement is late, until it has come | `most_unseen_s` |
-| closing without a stop | at the width that decides | `steps_to_decide` |
+| closing without a stop | at the last threshold that a fruit has to keep | `steps_to_decide` |
 | pressing | by what was measured: early stop, largest closing, outcome decided | `ends_steps` |
 | pressing | by what the gripper did: number of steps, force limit, closed fingers | `is_last_step` |
 | pressing | before a step that may be one too many, until the last one is measured | `may_decide` |
@@ -66,8 +66,8 @@ def most_unseen_s(recipe: Recipe) -> float:
 
 
 def steps_to_decide(recipe: Recipe) -> int:
-    """How many steps from the first image reach the damage threshold that decides."""
-    return min(recipe.steps.number, ceil((recipe.damage.deciding_closing_mm - AT_MM) / recipe.steps.step_mm))
+    """How many steps from the first image reach the last damage threshold that a fruit has to keep."""
+    return min(recipe.steps.number, ceil((recipe.damage.passing_closing_mm - AT_MM) / recipe.steps.step_mm))
 
 
 def ends_steps(press: Press, recipe: Recipe) -> bool:

@@ -267,6 +267,11 @@ class DamageThresholds(Settings):
         """The closing of the first limit that decides by itself on a fruit whose areas are trusted, mm."""
         return self.area[-1 if self.decided_by == "every_limit" else 0].closing_mm
 
+    @property
+    def passing_closing_mm(self) -> float:
+        """The closing of the last limit that a fruit whose areas are trusted has to keep, mm."""
+        return self.area[0 if self.decided_by == "first_trusted" else -1].closing_mm
+
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         wrong: list[tuple[Path, Message]] = []

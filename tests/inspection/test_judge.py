@@ -599,7 +599,9 @@ def test_every_limit_whose_area_is_trusted_has_to_be_kept(at_2_mm2, at_4_mm2, do
 
 def test_a_recipe_says_when_not_every_limit_decides():
     assert "decided_by" not in DECIDING.model_dump(mode="json")["damage"], "older recipes keep their content hash"
-    assert [recipe.damage.deciding_closing_mm for recipe in (DECIDING, FIRST_TRUSTED, EVERY_TRUSTED)] == [4, 2, 2]
+    recipes = (DECIDING, FIRST_TRUSTED, EVERY_TRUSTED)
+    assert [recipe.damage.deciding_closing_mm for recipe in recipes] == [4, 2, 2]
+    assert [recipe.damage.passing_closing_mm for recipe in recipes] == [4, 2, 4]
     both = FIRST_TRUSTED.model_copy(
         update={"damage": FIRST_TRUSTED.damage.model_copy(update={"decided_by": "every_limit"})}
     )

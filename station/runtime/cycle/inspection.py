@@ -82,12 +82,12 @@ class Inspection:
 
     @property
     def deciding_width_mm(self) -> float:
-        """The width of the first step that reaches the damage threshold that decides."""
+        """The width of the first step that reaches the last damage threshold that the fruit has to keep."""
         return self._width_after(self.steps_to_decide)
 
     @property
     def steps_to_decide(self) -> int:
-        """How many steps from the first image reach the damage threshold that decides."""
+        """How many steps from the first image reach the last damage threshold that the fruit has to keep."""
         return steps_to_decide(self.active.recipe)
 
     def _width_after(self, steps: int) -> float:
