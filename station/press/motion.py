@@ -54,7 +54,8 @@ async def sweep(rig: MovingRig, recipe: Recipe, measure: Measure) -> Met:
     readings = [await _read(rig)]
     clear_mm: float | None = None
     newer_than_s = time.monotonic()
-    moving: asyncio.Future[Position] | None = None
+    # At once: the reference has just shown the gel free, and what touches it now shows within the way of one reaction.
+    moving: asyncio.Future[Position] | None = asyncio.ensure_future(rig.close_to(stop.lowest_mm(recipe)))
     try:
         while True:
             ended = moving if moving is not None and moving.done() else None

@@ -124,6 +124,18 @@ def test_the_fingers_close_on_until_a_frame_shows_a_contact_and_each_frame_has_i
     asyncio.run(scenario())
 
 
+def test_the_fingers_close_while_the_first_frame_comes_and_stop_where_it_shows_that_something_touches_already(cell):
+    async def scenario():
+        fingers, rig, measure = cell(START_MM + 1.0)
+        met = await sweep(rig, BLUEBERRY, measure)
+        way_mm = BLUEBERRY.gripper.speed_mm_s * FRAME_S
+        assert met == (pytest.approx(START_MM - way_mm, abs=0.01), None)
+        assert START_MM - (await fingers.read()).width_mm < MOST_UNSEEN_MM
+        assert fingers.stops == 1
+
+    asyncio.run(scenario())
+
+
 def test_fingers_wait_for_a_measurement_that_is_late(cell, monkeypatch):
     async def scenario():
         fingers, rig, measure = cell(15.3)
