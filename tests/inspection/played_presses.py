@@ -16,7 +16,7 @@ from station.settings.recipe_model import Recipe
 from station.vocabulary import Flag, Reason
 
 PRESSES = 160
-_RECIPES = Path(__file__).parents[1] / "recipes_history" / "golden" / "form_1"
+_RECIPES = Path(__file__).parents[1] / "recipe_store" / "golden" / "form_1"
 """Of another release: what is shipped may change."""
 _SIZE = {
     "from": "length",

@@ -36,7 +36,7 @@ SIZE = {
 
 def recipe_with(**changes: object) -> Recipe:
     """A strawberry's of another release, with one limit of 100 mm² at 3 mm for a fruit of 40 mm."""
-    golden = Path(__file__).parents[1] / "recipes_history" / "golden" / "form_1"
+    golden = Path(__file__).parents[1] / "recipe_store" / "golden" / "form_1"
     values = find_recipe("strawberry", golden).model_dump(mode="json")
     values["damage"] = {
         "area": [{"closing_mm": 3.0, "area_mm2": 100.0, "least_area_mm2": 40.0}],

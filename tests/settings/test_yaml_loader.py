@@ -186,7 +186,7 @@ def test_whatever_the_bytes_there_is_a_document_and_problems_with_places(content
         assert "\n" not in str(problem)
 
 
-RECIPES = [*ROOT.glob("recipes/*.yaml"), *ROOT.glob("tests/recipes_history/golden/*/*.yaml")]
+RECIPES = [*ROOT.glob("recipes/*.yaml"), *ROOT.glob("tests/recipe_store/golden/*/*.yaml")]
 
 
 def by_ruamel(content):

@@ -26,7 +26,7 @@ from station.settings.recipe_model import Recipe
 from station.settings.records import RecordsSettings
 from station.vocabulary import Reason
 
-RECIPES = Path(__file__).parents[1] / "recipes_history" / "golden" / "form_1"
+RECIPES = Path(__file__).parents[1] / "recipe_store" / "golden" / "form_1"
 MM_PER_PX = 0.03
 ONSET_MM = 35.0
 

@@ -260,7 +260,8 @@ class Inspector:
             now.seen.append(await self._vision.measure(now.steps[-1]))
             if not stop.ends_steps(now.press(), now.active.recipe):
                 return True
-            now.closed_steps = now.active.recipe.steps.number  # no step after this image
+            # The image at rest may say otherwise, as one frame that is wrong makes an area fall: then it is stepped on.
+            now.closed_steps = max(1, now.whole_steps_to(step.move.width_mm))
             return False
 
         # The frames are measured one by one: none is measured ahead, since each follows the one before.

@@ -90,6 +90,10 @@ class Inspection:
         """How many steps from the first image reach the last damage threshold that the fruit has to keep."""
         return steps_to_decide(self.active.recipe)
 
+    def whole_steps_to(self, width_mm: float) -> int:
+        """How many whole steps lie between the first image and a width."""
+        return int((self.steps[0].move.width_mm - width_mm) / self.active.recipe.steps.step_mm)
+
     def _width_after(self, steps: int) -> float:
         return self.steps[0].move.width_mm - steps * self.active.recipe.steps.step_mm
 

@@ -21,7 +21,7 @@ from station.twin.clock import SteadyClock
 from station.twin.faults import FaultBoard
 from station.twin.ur.controller import UrController
 from station.twin.ur.registers import Registers
-from tests.arm import ur_clients
+from tests.devices.arm import ur_clients
 
 HEADER = struct.Struct(">HB")
 

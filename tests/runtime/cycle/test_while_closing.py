@@ -6,6 +6,7 @@ import json
 import pytest
 
 from station.inspection.states import State
+from station.press import stop
 from station.records.database import reading, records_folder
 from station.vocabulary import Reason
 from station.whatif.replay import recipe_of_snapshot, replay
@@ -68,3 +69,23 @@ def test_an_area_over_the_early_stop_ends_the_motion_on_its_way(inspected):
     assert {Reason.EARLY_STOP, Reason.AREA_OVER_LIMIT} & set(outcome.reasons), "over the one limit or the other"
     assert curve[-1].area_mm2 > 8.0
     assert curve[-1].closing_mm < 2.9, "it stopped before the limit's closing"
+
+
+@pytest.mark.timeout(180)
+def test_what_one_frame_on_the_way_says_is_asked_of_the_image_at_rest_and_else_the_steps_go_on(inspected, monkeypatch):
+    told, ends_steps = [], stop.ends_steps
+
+    def once(press, recipe):
+        closing_mm = press.points[-1].closing_mm
+        if not told and closing_mm > 1.0:
+            told.append(closing_mm)
+            return True
+        return ends_steps(press, recipe)
+
+    monkeypatch.setattr(stop, "ends_steps", once)
+    outcome, record = inspected()
+    [ended_mm] = told
+    closings_mm = [point.closing_mm for point in record.judged.curve]
+    assert outcome.outcome == "PASS", record.judged.explanation
+    assert any(ended_mm < each < 2.9 for each in closings_mm), "at rest, where the motion was ended"
+    assert 2.97 <= closings_mm[-1] < 3.4, "stepped on to the limit"

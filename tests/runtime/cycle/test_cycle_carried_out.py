@@ -7,7 +7,7 @@ from pathlib import Path
 
 from station.inspection.cycle import TABLE, Action, Event, Raise
 
-ROOT = Path(__file__).resolve().parents[2] / "station"
+ROOT = Path(__file__).resolve().parents[3] / "station"
 RUNTIME = [ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / "runtime").rglob("*.py")]
 DEADLINES = ast.parse((ROOT / "inspection" / "deadlines.py").read_text(encoding="utf-8"))
 

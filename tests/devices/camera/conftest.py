@@ -1,13 +1,10 @@
-"""What the tests of fruit, gel and camera share."""
+"""A running twin of the sensor, and the driver on its wire."""
 
-import csv
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
-from pathlib import Path
 from typing import NamedTuple
 
 import cv2
-import numpy as np
 import pytest
 
 from station.devices.camera.twin import TwinCamera
@@ -17,22 +14,6 @@ from station.twin.digit.sensor import DigitSensor
 from station.twin.digit.server import DigitCameraServer, digit_faults
 from station.twin.fruit import draw_fruit
 from station.twin.world import DIGIT_MM, World
-
-SAMPLES = Path(__file__).resolve().parents[3] / "shared" / "facts" / "paper-samples.csv"
-
-
-@pytest.fixture(scope="session")
-def paper_samples() -> dict[str, np.ndarray]:
-    """Weight, length and width of the paper's fruit, by kind."""
-    if not SAMPLES.is_file():
-        pytest.skip("the paper's samples are not beside this checkout")
-    samples: dict[str, list[list[float]]] = {}
-    with SAMPLES.open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            samples.setdefault(row["fruit"], []).append(
-                [float(row[name]) for name in ("weight_g", "length_mm", "width_mm")]
-            )
-    return {kind: np.array(rows) for kind, rows in samples.items()}
 
 
 class Bench(NamedTuple):

@@ -11,7 +11,7 @@ from station.inspection.cycle import LATCHES, STOPPED_FOR_A_PERSON, Action, Even
 from station.inspection.states import STATES, State
 from station.runtime.cycle.hold import FILE_NAME
 from station.runtime.cycle.runner import CycleRunner
-from tests.runtime.held_states import WAYS, Performer, hold_of
+from tests.runtime.cycle.held_states import WAYS, Performer, hold_of
 
 FRUIT = {State.PLACING_ACCEPT, State.PLACING_REJECT, State.CARRIED}
 ENDS = {
@@ -26,8 +26,8 @@ NOTHING_MOVES = {Action.HALT, Action.READ_DEVICES}
 @pytest.fixture
 def killed_at(tmp_path):
     """Kill a cycle on its way before a step; its last state and event, and whether it was killed at all."""
-    program = [sys.executable, "-m", "tests.runtime.held_states"]
-    with subprocess.Popen(program, stdin=-1, stdout=-1, text=True, cwd=Path(__file__).parents[2]) as nursery:
+    program = [sys.executable, "-m", "tests.runtime.cycle.held_states"]
+    with subprocess.Popen(program, stdin=-1, stdout=-1, text=True, cwd=Path(__file__).parents[3]) as nursery:
         orders, shown = nursery.stdin, nursery.stdout
         assert orders is not None
         assert shown is not None
