@@ -130,7 +130,7 @@ def test_a_contact_that_is_not_confirmed_is_searched_on_from_there():
             "MeasuredStep", SimpleNamespace(step=step, contact=SimpleNamespace(is_firm=flash or step.image.any()))
         )
 
-    observer.measure = measure  # type: ignore[method-assign]
+    observer.measure = measure
     asyncio.run(press(rig, BLUEBERRY, observer))
     before, start = observer.steps
     assert not flashes

@@ -249,7 +249,7 @@ class Inspector:
         return now.active.recipe.steps.measured == "while_closing" and not now.closed_steps
 
     async def _close_on(self, now: Inspection) -> None:
-        """Close without a stop to the last damage threshold that the fruit has to keep, measuring each frame on the way.
+        """Close without a stop to the last damage threshold that has to be kept, measuring each frame on the way.
 
         The fingers stop sooner where an area ends the steps.
         """
