@@ -94,7 +94,7 @@ Written by `./run bench cycle`: medians of {repeats} inspections of each fruit o
 above the nest, with a load of {load:.1f} on {cores} cores. *Next trigger* is where the station accepts one again:
 fruit and jaws are free, and the arm leaves meanwhile. *Fruit a minute* is measured in a row of {in_a_row}, each
 triggered as soon as it is accepted; the arm's way back is in it. The fruit lies in the middle. One that is centred or
-pressed twice takes longer: [200 fruit of a mixed line](triggers.md). Unverified on hardware.
+pressed twice takes longer: [a mixed line](triggers.md). Unverified on hardware.
 
 {table}
 

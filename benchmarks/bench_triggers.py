@@ -1,4 +1,4 @@
-"""Two hundred triggers over the wire: mixed fruit, good and damaged, and whether every book tells the same of each.
+"""Triggers over the wire: mixed fruit, sixty of each and more, and whether every book tells the same of each one.
 
 The line simulator triggers the real station (its service, PLC interface and arm driver, each a process) against the
 twin. What the PLC read is compared with the records and the metrics, and with the twin's truth. Writes
@@ -34,9 +34,8 @@ from station.settings.recipe import load_recipes
 from station.supervision.programs import station_programs, twin_program
 from station.supervision.supervisor import Supervisor
 
-TRIGGERS = 200
-DAMAGED_SHARE = 0.3
-SEED = 2026
+TRIGGERS, DAMAGED_SHARE, SEED = 394, 0.5, 2026
+"""So many are drawn until there are 60 sound and 60 damaged ones of each fruit."""
 KINDS = ("strawberry", "raspberry", "blueberry")
 CONSOLE_PORT = 49_311
 HOST = "127.0.0.83"
