@@ -1,6 +1,7 @@
 """Promises about the repository itself: locks, packaging, links, the run script."""
 
 import importlib.machinery
+import importlib.metadata
 import importlib.util
 import re
 import subprocess
@@ -47,6 +48,22 @@ def test_the_locks_satisfy_the_project():
         for text in requirements:
             requirement = Requirement(text)
             assert requirement.specifier.contains(locked[canonicalize_name(requirement.name)]), f"{text} in {lock}"
+
+
+@pytest.mark.parametrize("lock", ["requirements.lock", "requirements-dev.lock"])
+def test_a_lock_lists_what_its_packages_need_as_it_is_installed_without_looking_for_that(lock):
+    pinned = pins(lock)
+    wanting = []
+    for name in pinned:
+        for text in importlib.metadata.distribution(name).requires or []:
+            needed = Requirement(text)
+            if needed.marker is not None and not needed.marker.evaluate({"extra": ""}):
+                continue
+            version = pinned.get(canonicalize_name(needed.name))
+            if version is None or version not in needed.specifier:
+                wanting.append(f"{name} needs {needed}, {version} is listed")
+    assert wanting == []
+    assert len(pinned) > 30
 
 
 @pytest.mark.parametrize("lock", LOCKS)

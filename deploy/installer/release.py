@@ -133,7 +133,7 @@ def _make_environment(venv: Path, source: Path, packages: Packages) -> None:
     pip = (python, "-m", "pip", "--disable-pip-version-check", "--no-input")
     where = ("--no-index", "--find-links", packages.wheels) if packages.wheels else ()
     locks = [part for lock in LOCKS for part in ("-r", source / lock)]
-    run(*pip, "install", "--quiet", "--no-cache-dir", "--require-hashes", *where, *locks, limit_s=LONG_S)
+    run(*pip, "install", "--quiet", "--no-cache-dir", "--require-hashes", "--no-deps", *where, *locks, limit_s=LONG_S)
     run(*pip, *project)
 
 

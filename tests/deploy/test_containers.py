@@ -86,7 +86,7 @@ def test_the_image_takes_the_locks_by_their_hashes_and_is_nobody(root):
     assert len(bases) == 2
     assert len(set(bases)) == 1
     assert re.search(r":3\.11\.\d+-slim-bookworm$", bases[0])
-    assert "pip install --require-hashes -r requirements-build.lock -r requirements.lock" in text
+    assert "pip install --require-hashes --no-deps -r requirements-build.lock -r requirements.lock" in text
     assert "USER 990:990" in lines
     assert 'ENTRYPOINT ["tini", "--", "station"]' in lines
     assert "HEALTHCHECK" in text
