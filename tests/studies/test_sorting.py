@@ -27,13 +27,14 @@ CLOSINGS_MM = (0.0, 1.12, 1.87, 3.0, 4.12)
 SOUND_MM2 = (3.0, 19.0, 27.0, 37.0, 47.0)
 
 
-def pressed(areas_mm2=SOUND_MM2, offset_px=(0.0, 0.0), flags=()) -> Pressed:
-    """A closing on the blueberry above, in its own unit's pixels; the flags are the third step's."""
+def pressed(areas_mm2=SOUND_MM2, offset_px=(0.0, 0.0), flags=(), confidence=0.9) -> Pressed:
+    """A closing on the blueberry above, in its own unit's pixels; flags and confidence are the third step's."""
     scale = draw(BLUEBERRY).calibrated_mm_per_px
     steps = [
-        Step(closing_mm, round(area_mm2 / scale**2), 0.9, flags if number == 3 else (), offset_px, number / 2)
+        Step(closing_mm, round(area_mm2 / scale**2), 0.9, (), offset_px, number / 2)
         for number, (closing_mm, area_mm2) in enumerate(zip(CLOSINGS_MM, areas_mm2, strict=True))
     ]
+    steps[3] = steps[3]._replace(flags=flags, confidence=confidence)
     return Pressed(15.9, 0.1, tuple(steps))
 
 
@@ -118,11 +119,12 @@ class TestDeciding:
         )
 
     def test_an_inconclusive_fruit_is_pressed_once_more(self, recipe):
-        doubtful = pressed(flags=("low_confidence",))
+        doubtful, weak = (pressed(flags=("low_confidence",), confidence=confidence) for confidence in (0.2, 0.4))
         assert inspect(BLUEBERRY, recipe, Practice(), Presses(doubtful, pressed())).outcome == "PASS"
         assert inspect(BLUEBERRY, recipe, Practice(second_press=False), Presses(doubtful)).outcome == "NO_RESULT"
         twice = inspect(BLUEBERRY, recipe, Practice(), Presses(doubtful, doubtful))
         assert (twice.outcome, twice.reasons, twice.closings) == ("NO_RESULT", (Reason.LOW_CONFIDENCE,), 2)
+        assert inspect(BLUEBERRY, recipe, Practice(), Presses(weak, weak)).outcome == "PASS", "both together"
 
     def test_a_damaged_fruit_is_not(self, recipe):
         presses = Presses(pressed((9.0, 40.0, 60.0, 80.0, 100.0)))
