@@ -2,8 +2,8 @@
 
 Run with `./run bench hmi [SECONDS] [--rounds N]`: a whole demonstration with fruit after fruit; nobody looks, three
 panels take the page Run, ten readers page through the history and its images, three headless Chromiums show the page
-Run on the same cores, in turn in every round. Writes
-`docs/hmi-speed.md`. With `--pictures` it only draws the pages into `docs/images/hmi-*.png`.
+Run on the same cores, in turn in every round. Writes `docs/hmi-speed.md`. With `--pictures` it only draws the pages
+into `docs/images/hmi-*.png`.
 """
 
 import argparse

@@ -66,7 +66,7 @@ def _with(point: Measured, earlier: Sequence[Measured]) -> Measured:
 
 
 def _of_weak_edges(point: Measured, other: Measured) -> Measured:
-    """Two doubtful points as one where nothing but the edge's weakness speaks against either; else the first.
+    """Two doubtful points as one where nothing but the edge's weakness speaks against either; else the later one.
 
     A confidence is q²/(q² + k²) of the edge's signal to noise q. Two presses have their own noise each, so their q² add
     up, and with them the odds c/(1 - c). Areas that differ take off from that. The judge compares the sum with the

@@ -41,7 +41,7 @@ async def sweep(rig: MovingRig, recipe: Recipe, measure: Measure) -> Met:
     """Close from the present width without a stop until the newest frame shows a contact.
 
     The fingers wait for a measurement that is late, so that they are never more than `stop.MOST_UNSEEN_MM` and the way
-    of one reaction further than what was measured.
+    of one reaction further than what was measured, or than where they began while nothing is measured yet.
 
     Args:
         measure: gets one frame at a time.

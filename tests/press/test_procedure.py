@@ -7,6 +7,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from station.press.measurement import PressMeasurement
 from station.press.procedure import press
 from station.press.reference import JawsNotOpenError
 from station.press.rig import MeasuredStep, Position, Step
@@ -119,7 +120,7 @@ def test_the_frame_that_shows_the_contact_first_is_one_of_those_that_confirm_it(
 
 
 def test_a_contact_that_is_not_confirmed_is_searched_on_from_there():
-    rig, observer = WrittenRig(fruit_mm=FRUIT_MM), WrittenObserver(most=2)
+    rig, observer = WrittenRig(), WrittenObserver(most=2)
     flashes = [True]
 
     async def measure(step: Step) -> MeasuredStep:
@@ -181,3 +182,21 @@ def test_a_measurement_is_awaited_only_where_the_step_may_decide():
     assert may_decide(BLUEBERRY, deciding_mm) == BLUEBERRY.steps.stop_when_decided
     assert not may_decide(BLUEBERRY, deciding_mm - 0.5)
     assert not may_decide(BLUEBERRY, None)
+
+
+def test_a_frame_that_was_measured_in_the_search_is_not_measured_again_to_confirm_it():
+    measured: list[int] = []
+
+    class CountingMethod:
+        """Remembers the level of each image that it measures."""
+
+        def measure(self, image: Any, previous: Any = None) -> Any:
+            assert previous is None
+            measured.append(int(image[0, 0, 0]))
+            return SimpleNamespace(confidence=None, area_px=0)
+
+    frames = tuple(SimpleNamespace(image=np.full((2, 2, 3), level, np.uint8)) for level in (10, 20, 60))
+    measurement = PressMeasurement(cast("Any", CountingMethod()), 0.5)
+    measurement.measure(Step(-1, Position(15.0), cast("Any", frames[:1])))
+    measurement.measure(Step(0, Position(15.0), cast("Any", frames)))
+    assert measured == [10, 20, 60, 30], "each frame once, then their mean"
