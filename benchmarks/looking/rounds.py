@@ -118,7 +118,9 @@ def compared(
                 after = {part: sum(process.cpu_times()[:2]) for part, process in parts.items()}
                 later_s, later_fruit = own_time(metrics)
             shares = {part: 100 * (after[part] - before[part]) / seconds for part in parts}
-            own_ms = 1000 * (later_s - own_s) / max(1.0, later_fruit - fruit)
+            if later_fruit == fruit:
+                raise SystemExit(f"no fruit was inspected in {seconds:g} s: give more seconds for a round")
+            own_ms = 1000 * (later_s - own_s) / (later_fruit - fruit)
             found[name].append(Round(latency, shares, own_ms))
     return found
 
