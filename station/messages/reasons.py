@@ -4,7 +4,7 @@ from station.messages.message import Message, define, definition, verbatim
 
 AREA_OVER_LIMIT = define(
     "reason.area_over_limit",
-    "The contact area was not safely below the recipe's limit at one of its closings.",
+    "The contact area is over the recipe's limit at one of its closings, also with its uncertainty taken off.",
 )
 GROWTH_OVER_LIMIT = define("reason.growth_over_limit", "The contact area grew faster than the recipe's limit.")
 EARLY_STOP = define(
