@@ -119,9 +119,12 @@ def _marked(
 def _draft(recipe: Recipe, best: Proposal, name: str, folder: Path | None) -> tuple[Recipe, str]:
     """Return the recipe's text with the limit in the place of the one at its closing, or of the last.
 
-    Earlier limits are lowered and later ones raised where necessary, since limits rise with the closing.
+    Earlier limits are lowered and later ones raised where necessary, since limits rise with the closing. The comment
+    behind each changed value says where the new one comes from.
     """
     limits, limit = recipe.damage.area, round(best.limit_mm2, 1)
+    marked = f"`station thresholds`: {len(best.good)} good and {len(best.bad)} bad fruit"
+    of = "" if recipe.damage.size is None else "of a fruit of the reference length; "
     same = [place for place, each in enumerate(limits) if each.closing_mm == best.closing_mm]
     fits_last = len(limits) == 1 or best.closing_mm > limits[-2].closing_mm
     chosen = same[0] if same else len(limits) - 1 if fits_last else 0
@@ -130,16 +133,24 @@ def _draft(recipe: Recipe, best: Proposal, name: str, folder: Path | None) -> tu
         for place, each in enumerate(limits)
         if (place < chosen and each.area_mm2 > limit) or (place > chosen and each.area_mm2 < limit)
     }
+    comments = dict.fromkeys(changes, f"not beyond the limit at {best.closing_mm:g} mm, which is new")
     changes[f"damage.area[{chosen}].area_mm2"] = limit
-    changes[f"damage.area[{chosen}].closing_mm"] = best.closing_mm
+    comments[f"damage.area[{chosen}].area_mm2"] = of + marked
+    if limits[chosen].closing_mm != best.closing_mm:
+        changes[f"damage.area[{chosen}].closing_mm"] = best.closing_mm
+        comments[f"damage.area[{chosen}].closing_mm"] = f"{marked}, where they are told apart at the least cost"
     if chosen and recipe.damage.decided_by == "first_trusted":
-        changes["damage.decided_by"] = "every_limit"  # what is proposed decides on every fruit
-    if recipe.damage.size is not None:
+        changes["damage.decided_by"] = "every_limit"
+        comments["damage.decided_by"] = "what is proposed decides on every fruit"
+    if recipe.damage.size is not None and recipe.damage.size.exponent != best.exponent:
         changes["damage.size.exponent"] = best.exponent
-    changes["early_stop.area_mm2"] = max(recipe.early_stop.area_mm2, limit)
+        comments["damage.size.exponent"] = f"regression over these fruit; {marked}"
+    if recipe.early_stop.area_mm2 < limit:
+        changes["early_stop.area_mm2"] = limit
+        comments["early_stop.area_mm2"] = "the last limit"
     for path in recipe_files(folder):
         if find_recipe(path).name == recipe.name:
-            text, proposed = with_values(path.read_text(encoding="utf-8-sig"), changes, str(path))
+            text, proposed = with_values(path.read_text(encoding="utf-8-sig"), changes, str(path), comments)
             return proposed, text
     raise BadInputError(f"recipe {name}: there is no file of it to write a draft from")
 

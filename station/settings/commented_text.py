@@ -38,6 +38,20 @@ class CommentedText:
             expected = messages.NOT_EDITABLE(error=shortened(str(error), 200))
             raise SettingsError([Problem(messages.PATH(path=source), messages.FILE(), expected)]) from error
 
+    def comment(self, values: Any, key: str, text: str) -> None:
+        """Put a comment behind a value, in the place of the one there; comments on lines of their own stay.
+
+        Args:
+            values: the mapping that holds it.
+            key: the value's there.
+            text: one line, without its sign.
+        """
+        tokens = values.ca.items.get(key)
+        if tokens is None or tokens[2] is None:
+            values.yaml_add_eol_comment(text, key)
+        else:  # the lines of their own that follow are in the same token
+            tokens[2].value = f"# {text}\n" + tokens[2].value.partition("\n")[2]
+
     def written(self) -> str:
         """Return the text with the values as they are now."""
         text = io.StringIO()

@@ -14,13 +14,16 @@ from station.settings.recipe_versions import parse_recipe, upgrade
 _PART = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)|\[(\d{1,3})\]|(\d{1,3})")
 
 
-def with_values(text: str, changes: Mapping[str, Any], source: str) -> tuple[str, Recipe]:
+def with_values(
+    text: str, changes: Mapping[str, Any], source: str, comments: Mapping[str, str] | None = None
+) -> tuple[str, Recipe]:
     """Return a recipe's text with some values changed, checked as a whole.
 
     Args:
         text: a valid recipe's YAML.
         changes: new values by their dotted paths, as `damage.area[0].area_mm2`; the enclosing structure has to exist.
         source: the text's name for messages.
+        comments: of changed values, by their paths, in the place of those behind them, which were of the old values.
 
     Raises:
         BadInputError: there is no such value, or the recipe would be invalid; all problems.
@@ -29,6 +32,9 @@ def with_values(text: str, changes: Mapping[str, Any], source: str) -> tuple[str
     upgrade(commented.values)
     for path, value in changes.items():
         _set(commented.values, path, value)
+    for path, comment in (comments or {}).items():
+        values, key = _place(commented.values, path)
+        commented.comment(values, key, comment)
     changed = commented.written()
     return changed, parse_recipe(changed, source)
 
@@ -61,10 +67,16 @@ def _commented(text: str, source: str) -> CommentedText:
 
 
 def _set(values: Any, path: str, value: Any) -> None:
-    parts = [int(match[2] or match[3]) if match[1] is None else match[1] for match in _PART.finditer(path)]
     try:
-        for part in parts[:-1]:
-            values = values[part]
-        values[parts[-1]] = value  # one that no recipe has is refused with the whole
+        enclosing, key = _place(values, path)
+        enclosing[key] = value  # one that no recipe has is refused with the whole
     except (KeyError, IndexError, TypeError):
         raise BadInputError(messages.NO_SUCH_VALUE(path=shortened(path))) from None
+
+
+def _place(values: Any, path: str) -> tuple[Any, Any]:
+    """The structure that holds a value, and the value's key there."""
+    parts = [int(match[2] or match[3]) if match[1] is None else match[1] for match in _PART.finditer(path)]
+    for part in parts[:-1]:
+        values = values[part]
+    return values, parts[-1]

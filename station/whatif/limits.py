@@ -77,18 +77,20 @@ class Exponent:
     fruit: int
 
 
-def marked_fruit(press: Press, recipe: Recipe, closing_mm: float, *, good: bool) -> MarkedFruit | None:
+def marked_fruit(press: Press, recipe: Recipe, closing_mm: float, *, good: bool, draft: Recipe) -> MarkedFruit | None:
     """Return a press's constraint on the limit at a closing; None if a fault ended it before, or it touched nothing.
 
     A press that the judge rejects for other reasons than a limit is diverted by every limit. A fruit whose steps the
     judge ended before has at least the measured area; leaving out the worst of the bad fruit would be wrong. Of these,
-    a good one counts as diverted, a bad one as passed by any larger limit: the less favourable case.
+    a good one counts as diverted, a bad one as passed by any larger limit, the less favourable case, unless an earlier
+    limit or the growth has proven it damaged: those the draft keeps.
 
     Args:
         press: as stored.
         recipe: that it was pressed by.
         closing_mm: of the limit.
         good: the fruit's mark.
+        draft: the recipe that the limit is proposed for.
     """
     limits = sized_limits(press, recipe)
     evidence = Evidence(press, limits)
@@ -100,6 +102,8 @@ def marked_fruit(press: Press, recipe: Recipe, closing_mm: float, *, good: bool)
         return MarkedFruit(good, sum(area) if passes else math.inf, area[0], limits.length_mm)
     if early_stop(press, recipe) is None:
         return None
+    if judge(press, _with_open_limit(draft, closing_mm)).outcome == "FAIL":
+        return MarkedFruit(good, math.inf, None, limits.length_mm)
     known = [point.area_mm2 for point in evidence.judged if evidence.bounds(point)]
     at_least = max(known) if known and not good else math.inf
     return MarkedFruit(good, at_least, None, limits.length_mm, at_least=True)
@@ -222,6 +226,14 @@ def fewest_fruit(rate: float) -> int:
         rate: above 0 and below 1.
     """
     return math.ceil(math.log((1 - CONFIDENCE) / 2) / math.log(1 - rate))
+
+
+def _with_open_limit(recipe: Recipe, closing_mm: float) -> Recipe:
+    """Return the recipe with its earlier limits and growth, and an area at a closing that nothing is over."""
+    open_limit = {"closing_mm": closing_mm, "area_mm2": LARGEST_AREA_MM2}
+    earlier = [each for each in recipe.damage.area if each.closing_mm < closing_mm]
+    area = (*earlier, recipe.damage.area[-1].model_copy(update=open_limit))
+    return recipe.model_copy(update={"damage": recipe.damage.model_copy(update={"area": area})})
 
 
 def _without_limits(recipe: Recipe, closing_mm: float) -> Recipe:

@@ -84,10 +84,12 @@ def _at(
     costs: Costs,
 ) -> Proposal | None:
     seen = [
-        (each, marked_fruit(each.judged, own[each.recipe_sha256], closing_mm, good=marked[each.sequence] == "good"))
+        marked_fruit(
+            each.judged, own[each.recipe_sha256], closing_mm, good=marked[each.sequence] == "good", draft=recipe
+        )
         for each in stored
     ]
-    fruit = tuple(one for _, one in seen if one is not None)
+    fruit = tuple(one for one in seen if one is not None)
     reached = sum(one.area_mm2 is not None for one in fruit if one.good)
     all_good = sum(marked[each.sequence] == "good" for each in stored)
     found, rule = exponent_of(fruit), recipe.damage.size

@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -104,7 +105,7 @@ class TestWhatAPressSays:
         return Press(35.0, 0.2, points, interruptions, FruitSize(length_mm=45.4))
 
     def test_the_least_limit_is_where_the_judge_begins_to_pass_it(self):
-        one = marked_fruit(self.press(), self.RECIPE, 3.0, good=True)
+        one = marked_fruit(self.press(), self.RECIPE, 3.0, good=True, draft=self.RECIPE)
         assert one is not None
         assert one.area_mm2 == 90.0
         assert one.length_mm == 45.4
@@ -118,22 +119,30 @@ class TestWhatAPressSays:
         assert by(one.passes_from_mm2 - 0.01) != "PASS"
 
     def test_what_the_judge_doubts_passes_by_no_limit(self):
-        one = marked_fruit(self.press(flags=(Flag.CUT_BY_BORDER,)), self.RECIPE, 3.0, good=True)
+        one = marked_fruit(self.press(flags=(Flag.CUT_BY_BORDER,)), self.RECIPE, 3.0, good=True, draft=self.RECIPE)
         assert one is not None
         assert math.isinf(one.passes_from_mm2)
 
     def test_a_bad_fruit_that_was_stopped_before_has_at_least_its_area(self):
         stopped = self.press((8.0, 110.0, 160.0))
-        bad = marked_fruit(stopped, self.RECIPE, 3.0, good=False)
+        damage = self.RECIPE.damage.model_copy(update={"area": self.RECIPE.damage.area[-1:], "growth_mm2_per_mm": 500})
+        one_limit = self.RECIPE.model_copy(update={"damage": damage})
+        bad = marked_fruit(stopped, self.RECIPE, 3.0, good=False, draft=one_limit)
         assert bad is not None
         assert (bad.passes_from_mm2, bad.at_least) == (160.0, True)
-        good = marked_fruit(stopped, self.RECIPE, 3.0, good=True)
+        fails = marked_fruit(stopped, self.RECIPE, 3.0, good=False, draft=self.RECIPE)
+        assert fails is not None
+        assert (fails.passes_from_mm2, fails.at_least) == (math.inf, False), "by the limit at 1.9 mm, which is kept"
+        good = marked_fruit(stopped, self.RECIPE, 3.0, good=True, draft=self.RECIPE)
         assert good is not None
         assert math.isinf(good.passes_from_mm2)
 
     def test_a_fault_says_nothing_of_the_fruit(self):
-        assert marked_fruit(self.press((8.0, 50.0), Reason.CAMERA_FAULT), self.RECIPE, 3.0, good=False) is None
-        assert marked_fruit(Press(None, 0.0, ()), self.RECIPE, 3.0, good=True) is None
+        assert (
+            marked_fruit(self.press((8.0, 50.0), Reason.CAMERA_FAULT), self.RECIPE, 3.0, good=False, draft=self.RECIPE)
+            is None
+        )
+        assert marked_fruit(Press(None, 0.0, ()), self.RECIPE, 3.0, good=True, draft=self.RECIPE) is None
 
 
 def test_a_rate_of_none_seen_is_not_nought():
@@ -211,6 +220,46 @@ def test_the_proposed_limit_decides_on_every_fruit(
     damage = load_recipe(file).damage
     assert (damage.decided_by, len(damage.area)) == (drafted, 2)
     assert damage.area[1].area_mm2 < 130
+
+
+def test_no_comment_of_the_draft_is_of_a_value_before(orchard, station, tmp_path, monkeypatch):
+    """A limit above the early stop, at another closing, with another exponent: each line says where it is from."""
+    shipped = find_recipe("raspberry")
+    early, (area,) = shipped.early_stop, shipped.damage.area
+    stop = early.model_copy(update={"area_mm2": 62.0})
+    damage = shipped.damage.model_copy(update={"area": (area.model_copy(update={"area_mm2": 60.0}),)})
+    pressed_by = shipped.model_copy(update={"damage": damage, "early_stop": stop})
+    (tmp_path / "site").mkdir()
+    file = tmp_path / "site" / "raspberry.yaml"
+    text = (Path(__file__).parents[2] / "recipes" / "raspberry.yaml").read_text()
+    text = text.replace("area_mm2: 78 ", "area_mm2: 60 ").replace("area_mm2: 81 ", "area_mm2: 62 ")
+    file.write_text(text)
+    assert find_recipe("raspberry", tmp_path / "site") == pressed_by
+    monkeypatch.setenv("STATION_RECIPES_FOLDER", str(tmp_path / "site"))
+    random = np.random.default_rng(5)
+
+    def press(level: float) -> Press:
+        length_mm = round(random.uniform(18, 30), 1)
+        area_mm2 = level * (length_mm / 24) ** 2
+        areas = ((0.0, 4.0), (1.0, area_mm2 / 3), (2.0, 2 * area_mm2 / 3), (3.0, area_mm2))
+        points = tuple(Measured(closing, each, round(each * 1100), 0.9) for closing, each in areas)
+        return Press(24.0, 0.1, points, (), FruitSize(length_mm))
+
+    made = replace(orchard, recipe=pressed_by).store([*(press(60) for _ in range(20)), *(press(90) for _ in range(8))])
+    for word, some in (("good", made[:20]), ("bad", made[20:])):
+        assert station("records", "mark", *some, word)[0] == 0
+    proposed = tmp_path / "proposed.yaml"
+    code, told = station("thresholds", "--recipe", "raspberry", "--out", tmp_path / "out", "--draft", proposed)
+    assert code == 0, told
+    before, after = (each.replace("  #", " #").splitlines() for each in (text, proposed.read_text()))
+    marked = "`station thresholds`: 20 good and 8 bad fruit"
+    changed = [new for old, new in zip(before, after, strict=True) if old != new]
+    recipe = load_recipe(proposed)
+    assert [" ".join(line.split()) for line in changed] == [
+        f"area_mm2: {recipe.damage.area[0].area_mm2} # of a fruit of the reference length; {marked}",
+        f"exponent: {recipe.damage.size.exponent} # regression over these fruit; {marked}",
+        f"area_mm2: {recipe.early_stop.area_mm2} # the last limit",
+    ]
 
 
 @pytest.mark.parametrize(
