@@ -117,5 +117,17 @@
   }
 
   document.querySelectorAll("[data-poll]").forEach(poll);
+  // A slider has no name and so is not sent: it moves its field, and the field's typed value moves it.
+  function slide(slider) {
+    const field = document.getElementById(slider.dataset.slides);
+    slider.addEventListener("input", () => {
+      field.value = slider.value;
+    });
+    field.addEventListener("input", () => {
+      slider.value = field.value.replace(",", ".");
+    });
+  }
+
+  document.querySelectorAll("[data-slides]").forEach(slide);
   document.querySelectorAll("form[data-chart]").forEach(draw);
 })();

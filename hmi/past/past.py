@@ -13,6 +13,7 @@ from typing import Self
 import cv2
 
 from hmi.past.pictures import read_image, read_stages
+from hmi.past.tried import Tried, read_tried
 from station.channel.panel_queries import (
     AuditRowView,
     CurvePointView,
@@ -34,9 +35,10 @@ from station.records.model import FullRecord
 from station.records.queries import Summary, read_inspection
 from station.records.search import Query, find_page
 from station.settings.configuration import Configuration
+from station.settings.recipe_model import Recipe
 from station.support.bundle import bundle
 
-__all__ = ["PanelBusyError", "Past", "RecordsError", "UnknownInspectionError"]
+__all__ = ["PanelBusyError", "Past", "RecordsError", "Tried", "UnknownInspectionError"]
 
 _LONGEST_AUDIT_VALUE = 2000
 
@@ -140,6 +142,10 @@ class Past:
     async def stages(self, sequence: int, step: int) -> Stages:
         """Measure one step's stored image again, and return the measurement's stages."""
         return await self._worker.do(lambda: read_stages(self._folder, sequence, step))
+
+    async def tried(self, draft: Recipe) -> Tried | None:
+        """Return what a draft would have decided on past fruit; None before the first."""
+        return await self._worker.do(lambda: read_tried(self._folder, draft))
 
     async def support_bundle(self) -> bytes:
         """Return what `station support` writes, a ZIP file."""

@@ -1,14 +1,16 @@
 """Recipes page: state, editing as drafts with every limit drawn on past curves, approval by another person."""
 
+import json
 import re
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, File, Form, Query, Request, UploadFile
-from pydantic import StringConstraints
+from pydantic import StringConstraints, ValidationError
 from starlette.responses import Response
 
 from hmi.common.charts import area_over_closing
+from hmi.past.past import RecordsError, Tried
 from hmi.recipes.form import BadFieldError, changed, formatted, groups, with_changes
 from hmi.recipes.strip import strip
 from hmi.web.access import HmiNow, LocaleNow, caller_of, orders
@@ -49,12 +51,15 @@ from station.channel.panel_recipe_queries import (
 )
 from station.charts.area_chart import Curve, Kind, Limit
 from station.messages.message import Message
+from station.settings.recipe_model import Recipe
 
 router = APIRouter(prefix="/recipes")
 ENTRY = Entry("recipes", "/recipes")
 DEADLINE_S = 20.0
 _OFTEN = re.compile(r"damage\.area\[\d+\]|damage|early_stop|expected_width")
 """Groups of values that are changed often; the others are folded."""
+_SLIDES = re.compile(r"damage\.area\[\d+\]\.area_mm2")
+"""Values that a slider beside the field moves too."""
 _PREFIX = "v:"
 """Of a form's fields that are values of the recipe."""
 
@@ -251,6 +256,7 @@ async def _form(
         rare=[each for each in made if not _OFTEN.fullmatch(each.path)],
         texts=texts,
         prefix=_PREFIX,
+        slides=_SLIDES.fullmatch,
         wrong=wrong,
         reason=reason,
         drawn=await _drawn(hmi, locale, reply.row.name, reply.values),
@@ -302,6 +308,7 @@ async def _drawn(hmi: Hmi, locale: Locale, name: str, values: Mapping[str, Any])
     failed = sum(each.outcome == "FAIL" for each in past)
     label = locale.text("chart.recipe_label", n=len(past), failed=failed)
     return {
+        "tried": await _tried(hmi, values),
         "number": len(past),
         "failed": failed,
         "area": area_over_closing(curves, limits, locale, label, early["area_mm2"]),
@@ -318,6 +325,18 @@ async def _drawn(hmi: Hmi, locale: Locale, name: str, values: Mapping[str, Any])
             [("limit", robust["least_confidence"])],
         ),
     }
+
+
+async def _tried(hmi: Hmi, values: Mapping[str, Any]) -> Tried | Literal["invalid"] | None:
+    """Return what these values would have decided; None before the first inspection."""
+    try:
+        draft = Recipe.model_validate_json(json.dumps(values))
+    except ValidationError:  # two fields that do not fit each other: one of them is still to be typed
+        return "invalid"
+    try:
+        return await hmi.past.tried(draft)
+    except RecordsError:  # there are none yet
+        return None
 
 
 def _kind(curve: PastCurve) -> Kind:

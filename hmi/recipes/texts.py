@@ -42,6 +42,21 @@ define("recipes.revert", "Restore the file")
 define("recipes.revert_to", "Restore revision {n} in the file")
 define("recipes.whatif", "What would it have decided?")
 define("recipes.whatif_last", "Last fruit")
+define("recipes.slide", "{field}: slider")
+define(
+    "recipes.tried_rejects",
+    "Of the last {n} fruit {decided} can be known: {after} rejected by these values, {before} before.",
+)
+define("recipes.tried_good", "Marked good and rejected: {after} of {n}, {before} before")
+define("recipes.tried_bad", "Marked bad and passed: {after} of {n}, {before} before")
+define("recipes.tried_right", "Now right:")
+define("recipes.tried_wrong", "Now wrong:")
+define("recipes.tried_unknown", "Marked fruit that cannot be known: {n}")
+define(
+    "recipes.tried_none",
+    "No fruit of this recipe is marked good or bad. With marks (station records mark) both errors would be here.",
+)
+define("recipes.tried_invalid", "These values are no valid recipe together.")
 define("recipes.log_in", "To change a recipe, log in as quality.")
 define("recipes.bad_field", "{field}: expected {expected}")
 define("recipes.nothing_changed", "No value was changed.")

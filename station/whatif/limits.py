@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 
 from station.inspection.evidence import Evidence
 from station.inspection.judge import early_stop, judge
@@ -215,8 +215,10 @@ def rate_interval(happened: int, number: int) -> Interval:
     """
     if not number:
         return Interval(None, None)
-    found = stats.binomtest(happened, number).proportion_ci(CONFIDENCE, method="exact")
-    return Interval(float(found.low), float(found.high))
+    beyond, not_happened = (1 - CONFIDENCE) / 2, number - happened
+    low = special.betaincinv(happened, not_happened + 1, beyond) if happened else 0.0
+    high = special.betaincinv(happened + 1, not_happened, 1 - beyond) if not_happened else 1.0
+    return Interval(float(low), float(high))
 
 
 def fewest_fruit(rate: float) -> int:

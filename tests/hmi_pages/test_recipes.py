@@ -11,6 +11,8 @@ from hmi.recipes.form import BadFieldError, changed, formatted, groups
 from hmi.recipes.strip import strip
 from station.records.audit_report import read_audit
 from station.records.database import reading
+from station.records.marks import place_mark
+from station.records.short_transaction import short_transaction
 from station.settings.recipe import load_recipes
 
 pytestmark = pytest.mark.timeout(400)
@@ -62,6 +64,30 @@ def test_a_draft_is_written_shown_on_past_curves_rejected_and_another_approved(o
     told = rosa.go("/recipes/strawberry/history").locator("main").inner_text()
     assert "too strict" in told
     assert "seen on the curves" in told
+
+
+def test_a_slider_moves_the_limit_and_the_limit_moves_the_slider(panel: Any) -> None:
+    page = panel("Quin").go("/recipes/strawberry/edit")
+    field, slider = page.locator('[name="v:damage.area[0].area_mm2"]'), page.get_by_role("slider").first
+    mark = page.locator("[data-chart-here] .limit").first
+    before, stored = mark.get_attribute("d"), float(slider.input_value())
+    slider.press("ArrowLeft")
+    expect(field).to_have_value(f"{stored - 0.5:g}")
+    expect(mark).not_to_have_attribute("d", before or "")
+    field.fill(f"{stored + 1:g},5")
+    expect(slider).to_have_value(f"{stored + 1.5:g}")
+
+
+def test_the_typed_values_are_tried_on_past_fruit_and_against_the_marks(orchard: Any, panel: Any) -> None:
+    person = panel("Quin")
+    tried = person.go("/recipes/strawberry/edit").locator("[data-chart-here] .tried")
+    expect(tried).to_contain_text("No fruit of this recipe is marked")
+    with short_transaction(orchard.home / "records") as connection:
+        place_mark(connection, orchard.soft.sequence, "bad", "Ida")
+    tried = person.go("/recipes/strawberry/edit").locator("[data-chart-here] .tried")
+    expect(tried).to_contain_text("Marked bad and passed: 0 of 1, 0 before")
+    edit(person.page, "early_stop.area_mm2", "5")
+    expect(tried).to_contain_text("no valid recipe")
 
 
 def test_a_bad_draft_is_refused_beside_the_form_and_nothing_is_written(orchard: Any, panel: Any) -> None:
