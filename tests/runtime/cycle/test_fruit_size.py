@@ -1,28 +1,34 @@
-"""The fruit's size over the real wire: what the PLC wrote reaches the record, and the result as it was recorded."""
+"""The fruit's size over the real wire: what the PLC wrote reaches record and result, and one that cannot be decides."""
 
 import asyncio
+import json
 
 import pytest
 
 from station.inspection.fruit_size import FruitSize
+from station.settings.recipe import load_recipes
 
 NOT_GIVEN = FruitSize()
 
 
 @pytest.mark.timeout(180)
-def test_wrong_and_stale_sizes_are_recorded_and_echoed_as_they_were_given(bench, plc_interface, tmp_path):
+def test_wrong_and_stale_sizes_are_recorded_and_echoed_as_they_were_given(
+    bench, plc_interface, settings_file, tmp_path
+):
     given = {
         "absent": ({}, NOT_GIVEN),
         "length and class": ({"fruit_length_mm_x10": 161, "size_class": 3}, FruitSize(16.1, 3)),
         "stale": ({}, NOT_GIVEN),
         "impossible": ({"fruit_length_mm_x10": 65_535, "size_class": 65_535}, FruitSize(6553.5, 65_535)),
+        "contradiction": ({"fruit_length_mm_x10": 161, "size_class": 1}, FruitSize(16.1, 1)),
         "0": ({"fruit_length_mm_x10": 0, "size_class": 0}, NOT_GIVEN),
     }
 
     async def scenario():
-        async with bench() as cell:
+        async with bench(file) as cell:
             await cell.choose("blueberry")
             await cell.line.ready()
+            cell.lay("blueberry")
             async with plc_interface(tmp_path / "station.yaml") as plc:
                 found = {}
                 for trigger_id, (name, (size, _)) in enumerate(given.items(), start=1):
@@ -40,7 +46,18 @@ def test_wrong_and_stale_sizes_are_recorded_and_echoed_as_they_were_given(bench,
         await plc.write({"control": 1})
         assert shown.trigger_id == trigger_id
         record = await cell.station.service.registry.records.inspection(shown.sequence)
+        outcomes[trigger_id] = (shown.outcome, tuple(shown.reasons))
         await plc.acknowledge(shown.sequence)
         return record.trigger.size, FruitSize(shown.fruit_length_mm, shown.size_class)
 
+    file, place = settings_file(), tmp_path / "recipes" / "blueberry.yaml"
+    recipe = json.loads(place.read_text())
+    recipe["damage"]["size"] = load_recipes()["blueberry"].model_dump(mode="json")["damage"]["size"]
+    place.write_text(json.dumps(recipe))
+    outcomes = {}
     assert asyncio.run(scenario()) == {name: (size, size) for name, (_, size) in given.items()}
+    told = dict(zip(given, outcomes.values(), strict=True))
+    assert told["impossible"] == told["contradiction"] == ("NO_RESULT", ("size_unknown",))
+    assert {told[name] for name in ("absent", "length and class", "stale", "0")} == {("PASS", ())}, (
+        "by the fallback too"
+    )
