@@ -58,7 +58,16 @@ def share(group: Sequence[Inspected]) -> str:
     """
     if not group:
         return "not run"
-    count, of = sum(map(is_error, group)), len(group)
+    return share_of(sum(map(is_error, group)), len(group))
+
+
+def share_of(count: int, of: int) -> str:
+    """A share with its interval.
+
+    Args:
+        count: how many have it.
+        of: how many were looked at, at least 1.
+    """
     low, high = wilson(count, of)
     return f"{count} of {of}, {100 * count / of:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
 
@@ -70,9 +79,9 @@ def errors(inspected: Iterable[Inspected]) -> list[str]:
         inspected: by one practice.
     """
     groups = _grouped(inspected)
-    lines = _header("fruit", "sound diverted", *(f"{each} damage passed" for each in Severity))
+    lines = header("fruit", "sound diverted", *(f"{each} damage passed" for each in Severity))
     for kind in KINDS:
-        lines.append(_row(kind, *(share(groups.get((kind, group), [])) for group in (SOUND, *Severity))))
+        lines.append(row(kind, *(share(groups.get((kind, group), [])) for group in (SOUND, *Severity))))
     return lines
 
 
@@ -82,14 +91,14 @@ def worth(by_practice: Mapping[str, Iterable[Inspected]]) -> list[str]:
     Args:
         by_practice: the same fruit, inspected by each practice.
     """
-    lines = _header("used", "fruit", "sound diverted", "severe passed", "mild passed", "closings on a sound fruit")
+    lines = header("used", "fruit", "sound diverted", "severe passed", "mild passed", "closings on a sound fruit")
     for name, inspected in by_practice.items():
         groups = _grouped(inspected)
         for kind in KINDS:
             of_kind = [groups.get((kind, group), []) for group in (SOUND, Severity.SEVERE, Severity.MILD)]
             if sound := of_kind[0]:
                 closings = sum(one.closings for one in sound) / len(sound)
-                lines.append(_row(name, kind, *map(share, of_kind), f"{closings:.2f}"))
+                lines.append(row(name, kind, *map(share, of_kind), f"{closings:.2f}"))
     return lines
 
 
@@ -100,12 +109,12 @@ def diverted_why(inspected: Iterable[Inspected]) -> list[str]:
         inspected: by one practice.
     """
     groups = _grouped(inspected)
-    lines = _header("fruit", "sound, diverted", "reasons")
+    lines = header("fruit", "sound, diverted", "reasons")
     for kind in KINDS:
         wrong = [one for one in groups.get((kind, SOUND), []) if is_error(one)]
         reasons = Counter(reason.value for one in wrong for reason in one.reasons)
         told = ", ".join(f"{reason} {count}" for reason, count in reasons.most_common()) or "none"
-        lines.append(_row(kind, len(wrong), told))
+        lines.append(row(kind, len(wrong), told))
     return lines
 
 
@@ -117,7 +126,7 @@ def spared(before: Iterable[Inspected], after: Iterable[Inspected], recipes: Map
         after: as placed, until decided.
         recipes: by the fruit's kind.
     """
-    lines = _header("fruit", "pressed", "most force, N", "median, N", "steps a fruit", "their seconds")
+    lines = header("fruit", "pressed", "most force, N", "median, N", "steps a fruit", "their seconds")
     ways = (("to the early stop", _grouped(before)), ("until decided", _grouped(after)))
     for kind in KINDS:
         for name, groups in ways:
@@ -126,7 +135,7 @@ def spared(before: Iterable[Inspected], after: Iterable[Inspected], recipes: Map
                 steps = sum(one.steps for one in sound) / len(sound)
                 seconds = steps * _step_s(recipes[kind])
                 cells = f"{max(forces):.2f}", f"{median(forces):.2f}", f"{steps:.2f}", f"{seconds:.2f}"
-                lines.append(_row(kind, name, *cells))
+                lines.append(row(kind, name, *cells))
     return lines
 
 
@@ -138,7 +147,7 @@ def exchange(limits: str, inspected: Iterable[Inspected]) -> str:
         inspected: sound and mildly damaged fruit of one kind, by one practice.
     """
     groups = {group: fruit for (_, group), fruit in _grouped(inspected).items()}
-    return _row(limits, *(share(groups.get(group, [])) for group in (SOUND, Severity.MILD)))
+    return row(limits, *(share(groups.get(group, [])) for group in (SOUND, Severity.MILD)))
 
 
 def _step_s(recipe: Recipe) -> float:
@@ -155,13 +164,23 @@ def _grouped(inspected: Iterable[Inspected]) -> dict[tuple[str, str], list[Inspe
     return groups
 
 
-def _header(*names: object) -> list[str]:
-    return [_row(*names), "|" + "---|" * len(names)]
+def header(*names: object) -> list[str]:
+    """A table's first two lines.
+
+    Args:
+        names: of its columns.
+    """
+    return [row(*names), "|" + "---|" * len(names)]
 
 
-def _row(*cells: object) -> str:
+def row(*cells: object) -> str:
+    """A table's line.
+
+    Args:
+        cells: one for each column.
+    """
     return "| " + " | ".join(str(cell) for cell in cells) + " |"
 
 
-EXCHANGE = _header("limits, mm²", "sound diverted", "mild damage passed")
+EXCHANGE = header("limits, mm²", "sound diverted", "mild damage passed")
 """Head of the table whose lines `exchange` gives."""
