@@ -5,6 +5,7 @@ The functions say what the service's cycle does with measured steps; here the st
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from station.inspection.centring import Way, too_far
 from station.inspection.fruit_size import FruitSize
@@ -28,6 +29,16 @@ Source = Callable[[Closing], Pressed | None]
 """Gives a closing that is measured, or None."""
 
 
+class Found(NamedTuple):
+    """What `station calibrate` found of a unit."""
+
+    unit: int
+    """Seed of its light."""
+    mm_per_px: float
+    standard_uncertainty: float
+    """Relative, of the scale."""
+
+
 @dataclass(frozen=True, slots=True)
 class Practice:
     """What of the station is used."""
@@ -37,6 +48,8 @@ class Practice:
     centring: bool = True
     second_press: bool = True
     calibrated: bool = True
+    calibrations: tuple[Found, ...] = ()
+    """Of the units that press; of a unit that is not among them the result is drawn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,14 +156,14 @@ def as_stopped(
         practice: which scale and size the station has.
         earlier: closings on the same fruit, which are judged with this one.
     """
-    mm_per_px = specimen.calibrated_mm_per_px if practice.calibrated else TYPICAL_MM_PER_PX
+    mm_per_px, scale_uncertainty = _scale(specimen, practice)
     press = Press(
         pressed.onset_mm,
         pressed.onset_uncertainty_mm,
         (),
         size=_size(specimen, recipe, practice),
         resolution_mm=GripperCalibration().mm_per_count,
-        scale_uncertainty=CALIBRATION_SD if practice.calibrated else TYPICAL_STANDARD_UNCERTAINTY,
+        scale_uncertainty=scale_uncertainty,
     )
     for step in pressed.steps:
         press = replace(press, points=(*press.points, _measured(step, mm_per_px)))
@@ -171,6 +184,14 @@ def sized_by(practice: Practice, recipe: Recipe) -> Recipe:
         return recipe
     by_class = rule.model_copy(update={"judged_by": "class"})
     return recipe.model_copy(update={"damage": recipe.damage.model_copy(update={"size": by_class})})
+
+
+def _scale(specimen: Specimen, practice: Practice) -> tuple[float, float]:
+    """The scale by which the station takes an area, and its standard uncertainty."""
+    if not practice.calibrated:
+        return TYPICAL_MM_PER_PX, TYPICAL_STANDARD_UNCERTAINTY
+    found = next((one for one in practice.calibrations if one.unit == specimen.unit), None)
+    return (specimen.calibrated_mm_per_px, CALIBRATION_SD) if found is None else found[1:]
 
 
 def _size(specimen: Specimen, recipe: Recipe, practice: Practice) -> FruitSize:

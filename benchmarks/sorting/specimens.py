@@ -12,9 +12,13 @@ from station.twin.fruit import Fruit, Kind, draw_fruit
 KINDS = (Kind.BLUEBERRY, Kind.RASPBERRY, Kind.STRAWBERRY)
 SOUND = "sound"
 GROUPS = (SOUND, *Severity)
-SEEDS = {"tuning": 20, "tuning-2": 21, "tuning-3": 22, "tuning-4": 23, "judging": 24}
-"""Sets of fruit that never meet: recipes are tuned on the others and judged on the last, which no limit was chosen on.
-All but the first were judged on once, until something was chosen on them as well."""
+ON_UNITS = "units"
+"""The set of fruit that is pressed by a few units in turn."""
+SEEDS = {"tuning": 20, "tuning-2": 21, "tuning-3": 22, "tuning-4": 23, "judging": 24, ON_UNITS: 25}
+"""Sets of fruit that never meet: recipes are tuned on the others and judged on the last two, which no limit was chosen
+on. The tuning sets but the first were judged on once, until something was chosen on them as well."""
+UNITS = 20
+"""Units of `ON_UNITS`, at even distances over the whole range of scales."""
 
 _ZERO_SD_MM = 0.2
 _HABIT_PX, _HABIT_DEG = 10.0, 3.0
@@ -27,6 +31,15 @@ CALIBRATION_SD = 0.011
 three places (docs/calibration.md)."""
 _GRADER_MM = 1.0
 """A grader's length is within this of the true one, uniform."""
+
+
+class SensorUnit(NamedTuple):
+    """One sensor."""
+
+    light: int
+    """Seed of its light."""
+    mm_per_px: float
+    """Its true scale."""
 
 
 class Task(NamedTuple):
@@ -61,6 +74,17 @@ class Specimen:
     """The length as a grader has it."""
 
 
+def sensor_unit(number: int) -> SensorUnit:
+    """One of the units that press the fruit of `ON_UNITS`, the finest scale first.
+
+    Args:
+        number: from 0; they come again after `UNITS`.
+    """
+    finest, coarsest = _SCALES_MM_PER_PX
+    place = number % UNITS
+    return SensorUnit(1000 + place, finest + (coarsest - finest) * place / (UNITS - 1))
+
+
 def draw(task: Task) -> Specimen:
     """Draw a fruit and its cell; the same task gives the same.
 
@@ -77,6 +101,8 @@ def draw(task: Task) -> Specimen:
     shift_px = generator.normal(0.0, _HABIT_PX, 2) + generator.normal(0.0, _PLACE_PX, 2)
     turn_deg = generator.normal(0.0, _HABIT_DEG) + generator.normal(0.0, _TURN_DEG)
     mm_per_px = float(generator.uniform(*_SCALES_MM_PER_PX))
+    if task.seeds == ON_UNITS:
+        unit, mm_per_px = sensor_unit(task.number)
     return Specimen(
         fruit=fruit,
         pose=Pose(240.0 + shift_px[0], 320.0 + shift_px[1], turn_deg, generator.normal(0.0, _TILT_DEG)),

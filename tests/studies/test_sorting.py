@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.sorting import presses, tables
 from benchmarks.sorting.cycle import (
+    Found,
     Inspected,
     Practice,
     Unmeasured,
@@ -16,7 +17,7 @@ from benchmarks.sorting.cycle import (
     sized_by,
 )
 from benchmarks.sorting.presses import Closing, PressCache, Pressed, Step
-from benchmarks.sorting.specimens import KINDS, Task, draw
+from benchmarks.sorting.specimens import KINDS, ON_UNITS, UNITS, Task, draw
 from station.settings.recipe import find_recipe
 from station.twin.fruit import Kind
 from station.vision.scale import TYPICAL_MM_PER_PX
@@ -69,6 +70,15 @@ class TestSpecimens:
         assert 0.9 < np.abs(graded).max() <= 1.0
         errors = np.array([one.calibrated_mm_per_px / one.mm_per_px - 1 for one in drawn])
         assert errors.std() == pytest.approx(0.011, rel=0.15)
+
+    def test_a_few_units_over_the_whole_range_press_their_set_in_turn(self):
+        drawn = [draw(Task(Kind.RASPBERRY, "mild", ON_UNITS, number)) for number in range(UNITS + 1)]
+        scales = [one.mm_per_px for one in drawn[:UNITS]]
+        assert (scales[0], scales[-1]) == pytest.approx((0.0255, 0.0291))
+        assert np.diff(scales) == pytest.approx((0.0291 - 0.0255) / (UNITS - 1))
+        assert (drawn[UNITS].unit, drawn[UNITS].mm_per_px) == (drawn[0].unit, drawn[0].mm_per_px)
+        assert drawn[UNITS].fruit != drawn[0].fruit
+        assert len({one.unit for one in drawn}) == UNITS
 
     @pytest.mark.parametrize("kind", KINDS)
     def test_the_group_says_how_it_is_damaged(self, kind):
@@ -153,6 +163,13 @@ class TestDeciding:
             for calibrated in (True, False)
         ]
         assert areas[1] == pytest.approx(areas[0] * (0.0266 / 0.029) ** 2)
+
+    def test_a_unit_that_was_calibrated_has_the_scale_and_the_uncertainty_that_were_found(self, recipe):
+        one = replace(draw(BLUEBERRY), unit=7, calibrated_mm_per_px=0.027)
+        found = Practice(calibrations=(Found(6, 0.025, 0.01), Found(7, 0.03, 0.02)))
+        own, drawn = (as_stopped(pressed(), one, recipe, each, ())[0] for each in (found, Practice()))
+        assert own.points[2].area_mm2 == pytest.approx(drawn.points[2].area_mm2 * (0.03 / 0.027) ** 2)
+        assert (own.scale_uncertainty, drawn.scale_uncertainty) == (0.02, 0.011)
 
 
 class TestCache:
