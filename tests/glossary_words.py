@@ -55,7 +55,7 @@ MEANT: dict[str, tuple[str, ...]] = {
         "docs/alarms.md",  # a person does
     ),
     "shot": ("station/twin/can/gate.py", "station/twin/can/line.py"),  # `can.shot_deadline_s`
-    "sound diverted": ("README.md", "docs/sorting.md"),  # column headings of a result
+    "sound diverted": ("README.md", "docs/sorting.md", "docs/triggers.md"),  # column headings of a result
     "stands": ("docs/plc/handshake-table.md",),
     "witness": ("docs/robust-constants.md",),
 }
