@@ -255,6 +255,7 @@ def test_no_comment_of_the_draft_is_of_a_value_before(orchard, station, tmp_path
     marked = "`station thresholds`: 20 good and 8 bad fruit"
     changed = [new for old, new in zip(before, after, strict=True) if old != new]
     recipe = load_recipe(proposed)
+    assert recipe.damage.size is not None
     assert [" ".join(line.split()) for line in changed] == [
         f"area_mm2: {recipe.damage.area[0].area_mm2} # of a fruit of the reference length; {marked}",
         f"exponent: {recipe.damage.size.exponent} # regression over these fruit; {marked}",
