@@ -13,7 +13,7 @@ import psutil
 import pytest
 
 from station.devices.arm.faults import REMEDIES, ArmCause, ArmFault
-from station.devices.arm.messages import Reachable
+from station.devices.arm.messages import Move, Reachable
 from station.devices.arm.ur import UrArm
 from station.messages import arm as messages
 from station.settings.arm import ArmPoses, ArmSettings
@@ -48,6 +48,37 @@ def test_it_goes_from_pose_to_pose_and_says_where_it_is(healthy_arm):
                 assert bench.controller.joints_rad == pytest.approx(bench_pose(arm, pose), abs=1e-6)
             x, y, z = (await arm.state()).tool_position_mm
             assert (x / 1000, y / 1000, z / 1000) == pytest.approx(bench.controller.tool_position_m(), abs=1e-6)
+
+    asyncio.run(run())
+
+
+def test_an_arm_that_is_there_already_is_not_sent_there_again(healthy_arm, monkeypatch):
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            orders, order = [], arm._link.order
+
+            async def noted(request):
+                orders.append(type(request))
+                return await order(request)
+
+            monkeypatch.setattr(arm._link, "order", noted)
+            await arm.move_to("above_nest")
+            await arm.move_to("above_nest")
+            assert orders.count(Move) == 1
+            await arm.move_to("nest")
+            await arm.move_beside_nest((0.3, 0.0, 0.0))
+            await arm.move_to("nest")
+            assert bench.controller.joints_rad == pytest.approx(bench_pose(arm, "nest"), abs=1e-6), "beside is not at"
+
+            snapshot = arm._link.snapshot
+
+            async def stopped():
+                return (await snapshot()).model_copy(update={"runtime_state": RuntimeState.STOPPED})
+
+            orders.clear()
+            monkeypatch.setattr(arm._link, "snapshot", stopped)
+            await arm.move_to("nest")
+            assert orders == [Move], "where the program does not play, the controller's answer says so"
 
     asyncio.run(run())
 
