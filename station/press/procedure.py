@@ -12,7 +12,7 @@ from station.messages import grip as messages
 from station.press import stop
 from station.press.motion import GoesOn, Measure, Met, sweep
 from station.press.reference import take_reference
-from station.press.rig import MeasuredStep, MovingRig, Rig, Step
+from station.press.rig import MeasuredStep, MovingRig, Position, Rig, Step
 from station.settings.recipe_model import Recipe
 
 
@@ -68,7 +68,8 @@ async def _start(rig: MovingRig, recipe: Recipe, observer: Observer) -> Step | N
     if recipe.steps.start_width_mm is not None:
         start = await take_step(rig, recipe, 0, recipe.steps.start_width_mm)
     else:
-        before, first = await onset(rig, recipe, await sweep(rig, recipe, observer.measure), observer.measure)
+        opened = await back_off(rig, await sweep(rig, recipe, observer.measure))
+        before, first = await onset(rig, recipe, opened, observer.measure)
         start = first.step
         if before is not None:
             await observer.see_step(before)
@@ -99,27 +100,36 @@ async def close_in_steps(rig: Rig, recipe: Recipe, start_mm: float, goes_on: Goe
             return
 
 
-async def onset(rig: Rig, recipe: Recipe, met: Met, measure: Measure) -> Onset:
-    """Go back to where nothing touches, and find the onset from there as finely as the fingers can.
+async def back_off(rig: Rig, met: Met) -> Position:
+    """Open to where the sweep saw nothing touch.
+
+    Args:
+        met: where the sweep has met the fruit.
+    """
+    # A light contact begins unseen: half a count of room for it.
+    from_mm = (met.width_mm if met.clear_mm is None else met.clear_mm) + rig.finest_step_mm / 2
+    return await rig.open(min(from_mm, rig.widest_mm))
+
+
+async def onset(rig: Rig, recipe: Recipe, opened: Position, measure: Measure) -> Onset:
+    """Find the onset as finely as the fingers can, from where nothing touches.
 
     The onset's width is what every closing is counted from.
 
     Args:
-        met: where the sweep has met the fruit.
+        opened: where the fingers have backed off to; they open further while something touches.
 
     Raises:
         NothingTouchedError, UnseenContactError: as `sweep`.
     """
     search = _Search(rig, recipe, stop.lowest_mm(recipe), measure)
-    # A light contact begins unseen: half a count of room for it.
-    from_mm = (met.width_mm if met.clear_mm is None else met.clear_mm) + rig.finest_step_mm / 2
+    from_mm = opened.width_mm
     while True:  # back to where nothing touches, however faintly it began
-        from_mm = min(from_mm, rig.widest_mm)
-        await rig.open(from_mm)
-        met_mm, before, touching = await search.first_contact(from_mm)
+        met_mm, before, touching = await search.first_contact(from_mm, opened)
         if before is not None or from_mm >= rig.widest_mm:
             return await search.confirmed(met_mm, before, touching)
-        from_mm += recipe.steps.step_mm
+        from_mm = min(from_mm + recipe.steps.step_mm, rig.widest_mm)
+        opened = await rig.open(from_mm)
 
 
 async def onset_from(rig: Rig, recipe: Recipe, from_mm: float, lowest_mm: float, measure: Measure) -> Onset:
@@ -163,16 +173,22 @@ class _Search:
     def __init__(self, rig: Rig, recipe: Recipe, lowest_mm: float, measure: Measure) -> None:
         self._rig, self._recipe, self._lowest_mm, self._measure = rig, recipe, lowest_mm, measure
 
-    async def first_contact(self, from_mm: float) -> tuple[float, Step | None, Step]:
-        """Return the width asked for where the gel was touched first, the step before it, and that step."""
+    async def first_contact(self, from_mm: float, at: Position | None = None) -> tuple[float, Step | None, Step]:
+        """Return the width asked for where the gel was touched first, the step before it, and that step.
+
+        Args:
+            from_mm: where the search begins.
+            at: the fingers where they are there already.
+        """
         width_mm, before = from_mm, None
         while width_mm >= self._lowest_mm:
-            seen = await self._measure(await self._glance(width_mm))
+            move = at or await self._rig.close_to(width_mm)
+            seen = await self._measure(Step(-1, move, await self._rig.frames(1)))
             if stop.touches(seen):
                 return width_mm, before, seen.step
             if seen.step.move.held:
                 raise stop.nothing_touched(self._recipe, seen.step.move)
-            width_mm, before = width_mm - self._rig.finest_step_mm, seen.step
+            width_mm, before, at = width_mm - self._rig.finest_step_mm, seen.step, None
         raise stop.nothing_touched(self._recipe)
 
     async def confirmed(self, width_mm: float, before: Step | None, touching: Step) -> Onset:
@@ -192,6 +208,3 @@ class _Search:
                 return Onset(before, start)
             width_mm, nearer, touching = await self.first_contact(width_mm - self._rig.finest_step_mm)
             before = nearer or before
-
-    async def _glance(self, width_mm: float) -> Step:
-        return Step(-1, await self._rig.close_to(width_mm), await self._rig.frames(1))

@@ -1,6 +1,7 @@
 """The press procedure on a rig that is only written down: its order, its end, and what stops it."""
 
 import asyncio
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -117,6 +118,14 @@ def test_the_frame_that_shows_the_contact_first_is_one_of_those_that_confirm_it(
     start, number = observer.steps[1], BLUEBERRY.imaging.frames_per_step
     assert len(start.frames) == number
     assert rig.verbs[-4:-1] == ["close", "frames 1", f"frames {number - 1}"], "the jaws are not moved to confirm it"
+
+
+def test_the_search_begins_where_the_jaws_have_opened_to_and_does_not_send_them_there_again():
+    rig, observer = WrittenRig(), WrittenObserver(most=2)
+    asyncio.run(press(rig, BLUEBERRY, observer))
+    after_the_sweep = rig.verbs[rig.verbs.index("open", rig.verbs.index("enter")) :]
+    follows = {after for verb, after in pairwise(after_the_sweep) if verb == "open"}
+    assert follows == {"frames 1"}
 
 
 def test_a_contact_that_is_not_confirmed_is_searched_on_from_there():

@@ -14,7 +14,7 @@ from station.devices.gripper.interface import GripperReading, MoveResult, Object
 from station.messages import gripper as gripper_messages
 from station.press import motion
 from station.press.motion import close_on, sweep
-from station.press.procedure import onset
+from station.press.procedure import back_off, onset
 from station.press.stop import MOST_UNSEEN_MM, NothingTouchedError, UnseenContactError
 from station.runtime.devices import rig as rig_module
 from station.runtime.devices.rig import Cell, DeviceRig
@@ -115,7 +115,7 @@ def test_the_fingers_close_on_until_a_frame_shows_a_contact_and_each_frame_has_i
         assert met.width_mm < 15.3 <= met.clear_mm
         assert met.clear_mm - met.width_mm == pytest.approx(BLUEBERRY.gripper.speed_mm_s * FRAME_S, abs=0.01)
         assert 15.3 - stopped_mm < MOST_UNSEEN_MM
-        before, start = await onset(rig, BLUEBERRY, met, measure)
+        before, start = await onset(rig, BLUEBERRY, await back_off(rig, met), measure)
         assert min(fingers.opened_to_mm) > 15.3, "the fine search begins where nothing touches"
         assert before is not None
         assert before.move.width_mm >= 15.3 > start.step.move.width_mm

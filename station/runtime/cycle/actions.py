@@ -17,9 +17,9 @@ from station.inspection.second_press import FREED_BY_MM, needs_second_press
 from station.messages import operation as messages
 from station.messages.message import Message, message_of
 from station.press import stop
-from station.press.motion import close_on, sweep
-from station.press.procedure import onset, take_step
-from station.press.reference import ALARMS, BadReferenceError, JawsNotOpenError, open_jaws
+from station.press.motion import Met, close_on, sweep
+from station.press.procedure import back_off, onset, take_step
+from station.press.reference import ALARMS, BadReferenceError, JawsNotOpenError, are_open, open_jaws
 from station.press.rig import MeasuredStep, Position, Step
 from station.records.model import Image
 from station.runtime.alarms.manager import AlarmManager
@@ -89,8 +89,11 @@ class Inspector:
 
     async def check_jaws(self, now: Inspection) -> Event:
         """Make sure that the jaws are open before a reference is taken: else something may be held against the gel."""
+        rig = self._rig(now)
         try:
-            await open_jaws(self._rig(now))
+            at = await rig.read()
+            if at.blocked or not are_open(at.width_mm, rig.widest_mm):
+                await open_jaws(rig)
         except JawsNotOpenError as error:
             now.interrupt(Reason.REFERENCE_BAD, messages.JAWS_NOT_OPEN(width_mm=error.width_mm))
             return Event.REFERENCE_BAD
@@ -159,11 +162,12 @@ class Inspector:
                 met = await sweep(rig, recipe, self._seen)
                 stopped = await rig.read()
                 now.measures["overshoot_mm"] = round(met.width_mm - stopped.width_mm, 2)
-                if now.closings == 0 and self._sets_out(now, await self._first_contact(now, rig, stopped)):
+                opened, off = await self._backed_off(now, rig, met, stopped)
+                if self._sets_out(now, off):
                     now.closings = 1
                     now.let_go(met.width_mm)
                     return Event.OFF_MIDDLE
-                before, first = await onset(rig, recipe, met, self._seen)
+                before, first = await onset(rig, recipe, opened, self._seen)
                 now.before_onset_mm = None if before is None else before.move.width_mm
         except (stop.NothingTouchedError, stop.UnseenContactError) as error:
             now.interrupt(Reason.NO_CONTACT, message_of(error))
@@ -180,9 +184,24 @@ class Inspector:
         await self._vision.follow(now.seen[-1].contact)
         return Event.ONSET_FOUND
 
-    async def _first_contact(self, now: Inspection, rig: DeviceRig, at: Position) -> Way | None:
-        """How far a contact is off the field's middle where the fingers came to rest; None where there is none."""
-        return self._off_middle(now, await self._vision.measure(Step(-1, at, await rig.frames(1))))
+    async def _backed_off(self, now: Inspection, rig: DeviceRig, met: Met, at: Position) -> tuple[Position, Way | None]:
+        """Open to where nothing touched, and say how far the first contact was off the field's middle.
+
+        The way is None after the first closing, and where there was no contact any more.
+
+        Args:
+            met: where the sweep has met the fruit.
+            at: where the fingers came to rest.
+        """
+        if now.closings:
+            return await back_off(rig, met), None
+        # Measured while the jaws open: they do so whatever it shows.
+        measuring = asyncio.ensure_future(self._vision.measure(Step(-1, at, await rig.frames(1))))
+        try:
+            opened = await back_off(rig, met)
+            return opened, self._off_middle(now, await measuring)
+        finally:
+            measuring.cancel()
 
     @staticmethod
     def _off_middle(now: Inspection, seen: MeasuredStep) -> Way | None:

@@ -1,0 +1,106 @@
+"""The inspector's actions on devices that only note what is asked of them."""
+
+import asyncio
+from collections import defaultdict
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from station.devices.camera.interface import Frame
+from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
+from station.inspection.cycle import Event
+from station.press.motion import Met
+from station.press.rig import Position
+from station.runtime.cycle.actions import Inspector
+from station.settings.recipe import find_recipe
+from station.vocabulary import Reason
+
+OPEN_MM = 53.0
+
+
+class Jaws:
+    """A gripper that is where it was sent, or does not move at all."""
+
+    max_width_mm = OPEN_MM
+
+    def __init__(self, width_mm: float, *, moves: bool = True, state: ObjectState = ObjectState.AT_POSITION) -> None:
+        self.width_mm, self.opened_to_mm = width_mm, list[float]()
+        self.opened = asyncio.Event()
+        self._moves, self._state = moves, state
+
+    async def read(self) -> GripperReading:
+        return GripperReading(self.width_mm, 0, 0, self._state, True, 0, None, 0.0)
+
+    async def open(self, width_mm: float | None = None) -> MoveResult:
+        to_mm = self.max_width_mm if width_mm is None else width_mm
+        self.opened_to_mm.append(to_mm)
+        self.opened.set()
+        self.width_mm = to_mm if self._moves else self.width_mm
+        return MoveResult(to_mm, 0, await self.read())
+
+
+class Camera:
+    """A camera that always has a newer frame."""
+
+    async def frame(self, newer_than_s: float, _deadline_s: float) -> Frame:
+        return Frame(np.zeros((2, 2, 3), np.uint8), 1, newer_than_s + 0.03)
+
+
+class Vision:
+    """A measurement of one contact, that waits for something first."""
+
+    def __init__(self, wait_for: asyncio.Event) -> None:
+        self._wait_for = wait_for
+
+    def measure_ahead(self, _frame: Frame) -> None: ...
+
+    async def measure(self, step: Any) -> Any:
+        await self._wait_for.wait()
+        return SimpleNamespace(step=step, image=step.image, contact=SimpleNamespace(centroid_px=(0.5, 0.5)))
+
+
+def inspector(jaws: Jaws) -> Inspector:
+    cell = SimpleNamespace(camera=Camera(), gripper=jaws, arm=None)
+    monitors = defaultdict(lambda: SimpleNamespace(report_success=lambda: None))
+    devices = SimpleNamespace(cell=cell, monitors=monitors)
+    configuration = SimpleNamespace(service=SimpleNamespace(patience=1.0), arm=None)
+    metrics = SimpleNamespace(frame=lambda _fault: None)
+    made = (devices, Vision(jaws.opened), configuration, None, metrics)
+    return Inspector(*cast("tuple[Any, Any, Any, Any, Any]", made))
+
+
+def inspection() -> Any:
+    now = SimpleNamespace(active=SimpleNamespace(recipe=find_recipe("blueberry")), closings=0, mm_per_px=0.03)
+    now.reasons = list[Reason]()
+    now.interrupt = lambda reason, _why: now.reasons.append(reason)
+    return now
+
+
+def test_jaws_that_are_open_are_not_sent_open_again():
+    jaws = Jaws(OPEN_MM)
+    assert asyncio.run(inspector(jaws).check_jaws(inspection())) is Event.JAWS_OPEN
+    assert jaws.opened_to_mm == []
+
+
+@pytest.mark.parametrize(
+    ("width_mm", "state"), [(30.0, ObjectState.AT_POSITION), (OPEN_MM - 1.0, ObjectState.CONTACT_OPENING)]
+)
+def test_jaws_that_are_not_open_or_stopped_by_something_are_opened_and_checked(width_mm, state):
+    jaws, now = Jaws(width_mm, moves=False, state=state), inspection()
+    assert asyncio.run(inspector(jaws).check_jaws(now)) is Event.REFERENCE_BAD
+    assert jaws.opened_to_mm == [OPEN_MM]
+    assert now.reasons == [Reason.REFERENCE_BAD]
+
+
+def test_the_first_contact_is_measured_while_the_jaws_open():
+    async def scenario():
+        jaws = Jaws(14.0)
+        worker, now = inspector(jaws), inspection()
+        async with asyncio.timeout(10):
+            opened, way = await worker._backed_off(now, worker._rig(now), Met(14.5, 15.0), Position(14.0))
+        assert way is not None
+        assert opened.width_mm == jaws.opened_to_mm[0] == pytest.approx(15.2)
+
+    asyncio.run(scenario())
