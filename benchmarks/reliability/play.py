@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Awaitable, Callable
+from datetime import UTC, datetime
 
 from pydantic import BaseModel, ConfigDict
 
@@ -40,6 +41,8 @@ class Row(BaseModel):
     wrong: tuple[str, ...] = ()
     """What did not hold."""
     skipped: str = ""
+    played_on: str = ""
+    """The day, UTC, YYYY-MM-DD; empty in rows that were played before it was kept."""
 
 
 async def play(rig: Rig, scenario: Scenario, phase: Phase) -> Row:
@@ -50,7 +53,8 @@ async def play(rig: Rig, scenario: Scenario, phase: Phase) -> Row:
         scenario: what.
         phase: when.
     """
-    row, wrong = Row(scenario=scenario.name, phase=phase.value), list[str]()
+    today = datetime.now(UTC).date().isoformat()
+    row, wrong = Row(scenario=scenario.name, phase=phase.value, played_on=today), list[str]()
     wire = rig.wire
     accepted_before, passages_before = len(wire.accepted), len(wire.passages)
     asking = asyncio.create_task(_ask_why(rig, row), name="asking why")

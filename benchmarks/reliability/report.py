@@ -1,6 +1,7 @@
 """The page that the measured rows make."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 
 from .play import Row
@@ -46,6 +47,7 @@ def markdown(rows: Sequence[Row], scenarios: Sequence[Scenario]) -> str:
     skipped = sum(bool(row.skipped) for row in rows)
     lines = [
         f"{len(rows)} rows: {held} hold, {len(rows) - held - skipped} do not, {skipped} could not be played.",
+        f"Played: {_days(rows)}.",
         "",
         "| fault | phase | outcome | alarms | ready again | holds |",
         "|---|---|---|---|---|---|",
@@ -66,6 +68,12 @@ def markdown(rows: Sequence[Row], scenarios: Sequence[Scenario]) -> str:
     ]
     remarks = [f"- `{scenario.name}`: {scenario.remark}" for scenario in scenarios if scenario.remark]
     return _HEAD + "\n".join([*lines, *(["## Remarks", "", *remarks, ""] if remarks else [])])
+
+
+def _days(rows: Sequence[Row]) -> str:
+    """How many rows were played on which day: a run of some scenarios leaves the others as they were."""
+    days = Counter(row.played_on for row in rows)
+    return ", ".join(f"{days[day]} {f'on {day}' if day else 'on an earlier day'}" for day in sorted(days))
 
 
 def _line(row: Row, scenario: Scenario) -> str:
