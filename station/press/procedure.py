@@ -123,13 +123,15 @@ async def onset(rig: Rig, recipe: Recipe, opened: Position, measure: Measure) ->
         NothingTouchedError, UnseenContactError: as `sweep`.
     """
     search = _Search(rig, recipe, stop.lowest_mm(recipe), measure)
-    from_mm = opened.width_mm
+    widest = opened.width_mm >= rig.widest_mm
     while True:  # back to where nothing touches, however faintly it began
-        met_mm, before, touching = await search.first_contact(from_mm, opened)
-        if before is not None or from_mm >= rig.widest_mm:
+        # From the measured width: asked for from between two counts, a finest step may be two counts.
+        met_mm, before, touching = await search.first_contact(opened.width_mm, opened)
+        if before is not None or widest:
             return await search.confirmed(met_mm, before, touching)
-        from_mm = min(from_mm + recipe.steps.step_mm, rig.widest_mm)
-        opened = await rig.open(from_mm)
+        from_mm = opened.width_mm + recipe.steps.step_mm
+        widest = from_mm >= rig.widest_mm
+        opened = await rig.open(min(from_mm, rig.widest_mm))
 
 
 async def onset_from(rig: Rig, recipe: Recipe, from_mm: float, lowest_mm: float, measure: Measure) -> Onset:

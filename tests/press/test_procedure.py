@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from station.press.measurement import PressMeasurement
-from station.press.procedure import press
+from station.press.procedure import onset, press
 from station.press.reference import JawsNotOpenError
 from station.press.rig import MeasuredStep, Position, Step
 from station.press.stop import NothingTouchedError, UnseenContactError, is_last_step, may_decide
@@ -126,6 +126,35 @@ def test_the_search_begins_where_the_jaws_have_opened_to_and_does_not_send_them_
     after_the_sweep = rig.verbs[rig.verbs.index("open", rig.verbs.index("enter")) :]
     follows = {after for verb, after in pairwise(after_the_sweep) if verb == "open"}
     assert follows == {"frames 1"}
+
+
+def test_the_search_goes_count_by_count_also_where_the_jaws_were_asked_to_open_between_two_counts():
+    count_mm, widths_mm = 0.373, list[float]()
+
+    class Counted(WrittenRig):
+        """Fingers that reach whole counts only."""
+
+        def _count(self, width_mm: float) -> float:
+            return round(width_mm / count_mm) * count_mm
+
+        async def open(self, width_mm: float | None = None) -> Position:
+            return await super().open(None if width_mm is None else self._count(width_mm))
+
+        async def close_to(self, width_mm: float) -> Position:
+            reached = await super().close_to(self._count(width_mm))
+            widths_mm.append(reached.width_mm)
+            return reached
+
+    async def measure(step: Step) -> MeasuredStep:
+        contact = SimpleNamespace(is_firm=bool(step.image.any()))
+        return cast("MeasuredStep", SimpleNamespace(step=step, contact=contact))
+
+    for over_mm in np.arange(0.0, count_mm, 0.02):
+        rig = Counted()
+        opened = asyncio.run(rig.open(FRUIT_MM + 4 * count_mm + over_mm))
+        widths_mm.clear()
+        asyncio.run(onset(rig, BLUEBERRY, opened, measure))
+        assert -np.diff([opened.width_mm, *widths_mm]) == pytest.approx(count_mm), over_mm
 
 
 def test_a_contact_that_is_not_confirmed_is_searched_on_from_there():
