@@ -123,14 +123,13 @@ async def onset(rig: Rig, recipe: Recipe, opened: Position, measure: Measure) ->
         NothingTouchedError, UnseenContactError: as `sweep`.
     """
     search = _Search(rig, recipe, stop.lowest_mm(recipe), measure)
-    widest = opened.width_mm >= rig.widest_mm
+    from_mm = opened.width_mm
     while True:  # back to where nothing touches, however faintly it began
         # From the measured width: asked for from between two counts, a finest step may be two counts.
         met_mm, before, touching = await search.first_contact(opened.width_mm, opened)
-        if before is not None or widest:
+        if before is not None or from_mm >= rig.widest_mm:
             return await search.confirmed(met_mm, before, touching)
-        from_mm = opened.width_mm + recipe.steps.step_mm
-        widest = from_mm >= rig.widest_mm
+        from_mm += recipe.steps.step_mm
         opened = await rig.open(min(from_mm, rig.widest_mm))
 
 

@@ -157,6 +157,18 @@ def test_the_search_goes_count_by_count_also_where_the_jaws_were_asked_to_open_b
         assert -np.diff([opened.width_mm, *widths_mm]) == pytest.approx(count_mm), over_mm
 
 
+def test_jaws_that_something_keeps_from_opening_further_have_the_onset_where_they_are():
+    rig = WrittenRig(opens_to_mm=FRUIT_MM - 1.0)
+
+    async def scenario():
+        async with asyncio.timeout(10):
+            return await onset(rig, BLUEBERRY, await rig.open(), WrittenObserver().measure)
+
+    before, start = asyncio.run(scenario())
+    assert before is None
+    assert start.step.move.width_mm == FRUIT_MM - 1.0
+
+
 def test_a_contact_that_is_not_confirmed_is_searched_on_from_there():
     rig, observer = WrittenRig(), WrittenObserver(most=2)
     flashes = [True]
