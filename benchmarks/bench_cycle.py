@@ -104,7 +104,8 @@ anywhere: [a mixed line](triggers.md). Unverified on hardware.
 {table}
 
 *While closing*: with recipes that measure while the jaws close (`steps.measured: while_closing`), in the same run, as
-is *before*, the station of an earlier revision, where one was given (`--before`).
+is *before*, the station of an earlier revision, where one was given (`--before`). The force on the fruit by both ways:
+[decision 63](decisions/0063-measurement-while-the-jaws-close.md#force-on-the-fruit).
 
 ![The floor's parts and ours](images/cycle-time.svg)
 
