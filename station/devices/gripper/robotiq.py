@@ -248,7 +248,8 @@ class Robotiq2F85:
         if asked_s > deadline_s:
             late = _late_at(step, status) if status else messages.LATE(step=step)
             raise GripperTimeoutError(late, messages.REMEDY_LATE())
-        await asyncio.sleep(_POLL_S)
+        # From one request to the next: the exchange is part of the period.
+        await asyncio.sleep(max(0.0, asked_s + _POLL_S - time.monotonic()))
 
     def _active_fault(self, status: Status, now_s: float) -> int:
         if status.fault != _NO_COMMUNICATION:

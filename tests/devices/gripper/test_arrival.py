@@ -2,9 +2,12 @@
 
 import asyncio
 from dataclasses import replace
+from itertools import pairwise
+from types import SimpleNamespace
 
 import pytest
 
+from station.devices.gripper import robotiq
 from station.devices.gripper.errors import GripperTimeoutError
 from station.devices.gripper.link import State, Status
 from station.devices.gripper.robotiq import Robotiq2F85
@@ -73,6 +76,30 @@ def test_fingers_that_arrived_are_not_late_because_their_answers_are_read_late()
     link = SlowLink(replace(START, echo=TARGET, position=TARGET))
     assert moved(link) == TARGET
     assert link.sent == [f"go_to {TARGET}"]
+
+
+@pytest.mark.parametrize(("answers_in_s", "every_s"), [(0.002, 0.005), (0.008, 0.008)])
+def test_a_moving_gripper_is_asked_as_often_as_it_refreshes_however_long_an_answer_takes(
+    monkeypatch, answers_in_s, every_s
+):
+    now_s, asked_s = 100.0, list[float]()
+
+    class TimedLink(ScriptedLink):
+        async def status(self) -> Status:
+            nonlocal now_s
+            asked_s.append(now_s)
+            now_s += answers_in_s
+            return await super().status()
+
+    async def sleep(duration_s: float) -> None:
+        nonlocal now_s
+        now_s += duration_s
+
+    monkeypatch.setattr(robotiq, "time", SimpleNamespace(monotonic=lambda: now_s))
+    monkeypatch.setattr(robotiq.asyncio, "sleep", sleep)
+    moving = replace(START, echo=TARGET, object_=0, position=51)
+    assert moved(TimedLink(moving, moving, replace(START, echo=TARGET, position=TARGET))) == TARGET
+    assert [after - before for before, after in pairwise(asked_s[1:])] == pytest.approx([every_s] * 3)
 
 
 @pytest.mark.parametrize(
