@@ -116,7 +116,7 @@ def compare(task: Task) -> list[Pair]:
         return closing_mm <= closings_mm[-1]
 
     stepped.close(onset, goes_on)
-    tracker = PressTracker(grip.method, recipe.segmentation.robust.least_confidence, first=onset.contact)
+    tracker = PressTracker(grip.method, first=onset.contact)
     on_the_way = swept(tracker, rig, recipe, onset, closings_mm[-1], np.random.default_rng(one.noise_seed))
     frames = [(0.0, onset.contact), *on_the_way]
     press = press_of(one, onset)
@@ -210,7 +210,7 @@ def closed_on(one: Specimen, recipe: Recipe, onset: Onset, rig: FruitRig, grip: 
     """
     step_mm, number = recipe.steps.step_mm, recipe.imaging.frames_per_step
     target_mm = at_count(steps_to_decide(recipe) * step_mm)
-    tracker = PressTracker(grip.method, recipe.segmentation.robust.least_confidence, first=onset.contact)
+    tracker = PressTracker(grip.method, first=onset.contact)
     press = press_of(one, onset)
 
     def ends(closing_mm: float, contact: Contact) -> bool:

@@ -127,7 +127,7 @@ def measure_press(
     method = RobustMethod(press.references, trial.parameters, constants, trial.without)
     prepared = read()
     least = trial.parameters.least_confidence
-    tracker = PressTracker(method, least) if followed else None
+    tracker = PressTracker(method) if followed else None
     steps: list[Step] = []
     largest_judged_px = 0
     for number, (image, truth) in enumerate(zip(press.images, press.truths, strict=True)):

@@ -46,7 +46,7 @@ def border_table() -> list[str]:
                 peer = contact_area_idea(median_image(press.references))
                 for step in press.steps:
                     if step.true_mm2 > 2 and step.is_cut:
-                        contact = measure_step(method, step.frames, parameters.least_confidence)
+                        contact = measure_step(method, step.frames)
                         ratios.append(contact.area_px / step.true_px)
                         peers.append(np.count_nonzero(peer(mean_image(step.frames))) / step.true_px)
                         told = contact.flags & {Flag.CUT_BY_BORDER, Flag.LOW_CONFIDENCE, Flag.UNDECIDED}

@@ -156,7 +156,7 @@ def measured_presses(seeds: Sequence[int], kinds: Sequence[str] = FRUITS, *, bru
         for number, (kind, name, press) in enumerate(twin_presses(seed, kinds, bruised=bruised)):
             method, peer = RobustMethod(press.references, parameters), contact_area_idea(median_image(press.references))
             for step in press.steps:
-                contact = measure_step(method, step.frames, parameters.least_confidence)
+                contact = measure_step(method, step.frames)
                 area_px, single_px = contact.area_px, method.measure(step.frames[0]).area_px
                 peer_px = int(np.count_nonzero(peer(mean_image(step.frames))))
                 areas_px = (area_px, single_px, peer_px)

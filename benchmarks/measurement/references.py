@@ -19,7 +19,6 @@ TWIN_SEEDS = range(91_000, 91_100)
 
 def reference_table(folder: Path) -> list[str]:
     """What is flagged, found and judged against a reference that does not belong to the frames."""
-    least = RobustParameters().least_confidence
     rows: list[tuple[str, list[Contact]]] = []
     paths = sorted((folder / "digit_backgrounds").glob("*.jpg"))
     units = [np.asarray(cv2.imread(str(path)), np.uint8) for path in paths]
@@ -29,7 +28,7 @@ def reference_table(folder: Path) -> list[str]:
     own = [method.measure(unit) for method, unit in zip(methods, units, strict=True)]
     rows.append(("real, its own reference, untouched", own))
     other = soft_bodies.other_unit_pairs(TWIN_SEEDS)
-    rows.append(("twin, another unit's reference, untouched", _measured(other, least)))
+    rows.append(("twin, another unit's reference, untouched", _measured(other)))
     pressed: list[Contact] = []
     for seed in TWIN_SEEDS[:17]:
         for press in soft_bodies.soft_presses([seed], frames_per_step=1, steps=4):
@@ -37,9 +36,7 @@ def reference_table(folder: Path) -> list[str]:
             method = RobustMethod(mixed.references, RobustParameters())
             pressed.append(method.measure(mixed.steps[-1].frames[0]))
     rows.append(("twin, another unit's reference, pressed", pressed))
-    rows.append(
-        ("twin, specks moved since the reference, untouched", _measured(soft_bodies.moved_specks(TWIN_SEEDS), least))
-    )
+    rows.append(("twin, specks moved since the reference, untouched", _measured(soft_bodies.moved_specks(TWIN_SEEDS))))
     lines = ["| frames | pairs | flagged as another unit's | with an area | judged |", "|---|---|---|---|---|"]
     for name, contacts in rows:
         flagged = sum(Flag.REFERENCE_MISMATCH in one.flags for one in contacts)
@@ -48,10 +45,8 @@ def reference_table(folder: Path) -> list[str]:
     return lines
 
 
-def _measured(pairs: Iterable[soft_bodies.Untouched], least_confidence: float) -> list[Contact]:
-    return [
-        measure_step(RobustMethod(pair.references, RobustParameters()), pair.frames, least_confidence) for pair in pairs
-    ]
+def _measured(pairs: Iterable[soft_bodies.Untouched]) -> list[Contact]:
+    return [measure_step(RobustMethod(pair.references, RobustParameters()), pair.frames) for pair in pairs]
 
 
 def compressed(images: Sequence[Image], how: str) -> list[Image]:

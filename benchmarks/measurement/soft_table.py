@@ -82,14 +82,13 @@ def measured_press(seed: int) -> list[Steps]:
     cv2.setNumThreads(1)
     found: list[Steps] = []
     for press in soft_bodies.soft_presses([seed]):
-        least = RobustParameters().least_confidence
         method = RobustMethod(press.references, RobustParameters())
-        tracker, peer = PressTracker(method, least), contact_area_idea(median_image(press.references))
+        tracker, peer = PressTracker(method), contact_area_idea(median_image(press.references))
         true_px = np.array([np.count_nonzero(filled(step.true_mask)) for step in press.steps], float)
         forces_n = np.array([step.force_n for step in press.steps])
         contacts = {
             FOLLOWED: [tracker.measure_step(step.frames) for step in press.steps],
-            ALONE: [measure_step(method, step.frames, least) for step in press.steps],
+            ALONE: [measure_step(method, step.frames) for step in press.steps],
         }
         for way, some in contacts.items():
             areas_px, judged = np.array([float(one.area_px) for one in some]), np.array([_judged(one) for one in some])

@@ -42,7 +42,7 @@ def untouched(unit: int, condition: str) -> list[Untouched]:
         times_s = [after_s + k / FRAMES_PER_S for k in range(FRAMES_PER_STEP)]
         frames = [sensor.frame(None, now_s, options.condition) for now_s in times_s]
         mean = mean_image(frames)
-        contact = measure_step(method, frames, parameters.least_confidence)
+        contact = measure_step(method, frames)
         found.append(Untouched(contact, float(method.weak_response(mean)[0].max()), bool(np.any(peer(mean)))))
     return found
 

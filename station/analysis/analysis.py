@@ -104,7 +104,6 @@ def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
             order,
             shape,
             lambda: make_method(references, request.segmentation),
-            least_confidence=request.segmentation.robust.least_confidence,
             jobs=request.jobs,
             stages=request.stages,
         ):

@@ -49,12 +49,11 @@ class _Press:
 
     Args:
         get_method: returns the method of the measuring thread.
-        least_confidence: the recipe's.
         stages: return the stages' pictures.
     """
 
-    def __init__(self, get_method: MakeMethod, least_confidence: float, *, stages: bool) -> None:
-        self._get_method, self._least_confidence, self._stages = get_method, least_confidence, stages
+    def __init__(self, get_method: MakeMethod, *, stages: bool) -> None:
+        self._get_method, self._stages = get_method, stages
         self._staged: StagedMethod | None = None
         self._tracker: PressTracker | None = None
 
@@ -71,7 +70,7 @@ class _Press:
             method = self._get_method()
             if self._stages:
                 method = self._staged = StagedMethod(method)
-            self._tracker = PressTracker(method, self._least_confidence)
+            self._tracker = PressTracker(method)
         contact = self._tracker.measure_step([image])
         return contact, {} if self._staged is None else self._staged.pictures
 
@@ -82,7 +81,6 @@ def measure_all(
     shape: tuple[int, ...],
     make_method: MakeMethod,
     *,
-    least_confidence: float,
     jobs: int,
     stages: bool,
 ) -> Iterator[Measured | Refused]:
@@ -97,7 +95,6 @@ def measure_all(
         order: every source once; a video's frames forwards.
         shape: the reference's shape (height, width, 3).
         make_method: makes a method for one thread's use.
-        least_confidence: the recipe's; below it a contact is flagged.
         jobs: number of threads, 1 or more.
         stages: return the stages' pictures.
     """
@@ -116,7 +113,7 @@ def measure_all(
     pool, in_order = (ThreadPoolExecutor(count, thread_name_prefix="measure") for count in (jobs, 1))
     try:
         for run in order:
-            press = _Press(get_method, least_confidence, stages=stages)
+            press = _Press(get_method, stages=stages)
             for number in run.numbers:
                 item = _load(sources[number], number, shape)
                 executor = in_order if run.followed else pool

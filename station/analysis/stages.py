@@ -14,7 +14,13 @@ class StagedMethod:
         self.pictures: dict[str, npt.NDArray[np.uint8]] = {}
         """Of the image that was measured last, by the stages' names, in their order."""
 
-    def measure(self, image: Image, on_stage: StageSink | None = None, previous: Contact | None = None) -> Contact:
+    def measure(
+        self,
+        image: Image,
+        on_stage: StageSink | None = None,
+        previous: Contact | None = None,
+        agreed: float = 1.0,
+    ) -> Contact:
         """See `Method.measure`."""
         self.pictures = {}
 
@@ -23,4 +29,4 @@ class StagedMethod:
             if on_stage is not None:
                 on_stage(name, picture)
 
-        return self._method.measure(image, keep, previous)
+        return self._method.measure(image, keep, previous, agreed)

@@ -70,7 +70,7 @@ class BallPress:
         untouched = await take_reference(self._rig, number)
         self.reference = await asyncio.to_thread(reference_image, untouched.frames)
         method = await asyncio.to_thread(make_method, [self.reference], self._segmentation)
-        self._measurement = PressMeasurement(method, self._recipe.segmentation.robust.least_confidence)
+        self._measurement = PressMeasurement(method)
         return untouched
 
     async def measure(self, step: PressStep) -> MeasuredStep:

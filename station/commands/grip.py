@@ -100,7 +100,7 @@ class _Observer:
         self._recording.add_references(untouched.images)
         segmentation = self._recipe.segmentation
         method = await asyncio.to_thread(make_method, untouched.images, segmentation)
-        self._measurement = PressMeasurement(method, segmentation.robust.least_confidence)
+        self._measurement = PressMeasurement(method)
 
     async def measure(self, step: Step) -> MeasuredStep:
         assert self._measurement is not None  # noqa: S101 (the reference comes first)

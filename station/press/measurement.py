@@ -15,11 +15,10 @@ class PressMeasurement:
 
     Args:
         method: prepared for the reference.
-        least_confidence: the recipe's; below it a contact is flagged.
     """
 
-    def __init__(self, method: Method, least_confidence: float) -> None:
-        self._method, self._least_confidence = method, least_confidence
+    def __init__(self, method: Method) -> None:
+        self._method = method
         self._tracker: PressTracker | None = None
         """Of the press that is followed; None while each step is measured by itself."""
         self._known: dict[int, tuple[Image, Contact]] = {}
@@ -36,7 +35,7 @@ class PressMeasurement:
         Args:
             first: the contact of the press's first step.
         """
-        self._tracker = PressTracker(self._method, self._least_confidence, first)
+        self._tracker = PressTracker(self._method, first)
         self._known.clear()
 
     def prepare_next(self, image: Image) -> None:
@@ -59,7 +58,7 @@ class PressMeasurement:
         if self._tracker is not None:
             return MeasuredStep(step, step.image, self._tracker.measure_step(step.images))
         known = {key: contact for key, (_, contact) in self._known.items()}
-        contact = measure_step(self._method, step.images, self._least_confidence, known=known)
+        contact = measure_step(self._method, step.images, known=known)
         self._known.clear()
         if len(step.images) == 1:  # the frame that shows the contact first is one of those that confirm it
             self._known[id(step.images[0])] = step.images[0], contact

@@ -39,7 +39,7 @@ def press_sheet(study: Study, number: int) -> bytes:
     press = member(request.kind, request.seed, number - 1).press()
     segmentation = segmentation_of(request.fruit, request.method)
     method = StagedMethod(make_method(press.references, segmentation))
-    tracker = PressTracker(method, segmentation.robust.least_confidence)
+    tracker = PressTracker(method)
     places = _spread(press.closings_mm)
     columns: list[dict[str, npt.NDArray[np.uint8]]] = []
     for place, frame in enumerate(press.frames):  # all of them, since each step is measured with the one before

@@ -153,7 +153,7 @@ class Grip:
         self._recipe, self._rig = recipe, rig
         untouched = asyncio.run(take_reference(rig, recipe.imaging.reference_frames))
         self.method = make_method(untouched.images, recipe.segmentation)
-        self._measurement = PressMeasurement(self.method, recipe.segmentation.robust.least_confidence)
+        self._measurement = PressMeasurement(self.method)
 
     def held(self, closing_mm: float) -> Contact:
         """Measure one step by itself, at a width that something else than the gripper's counts decides.

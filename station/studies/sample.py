@@ -56,7 +56,7 @@ def measure_sample(task: Task) -> SampleResult:
     one = member(task.fruit, task.seed, task.number - 1)
     press = one.press()
     segmentation = segmentation_of(task.fruit, task.method)
-    tracker = PressTracker(make_method(press.references, segmentation), segmentation.robust.least_confidence)
+    tracker = PressTracker(make_method(press.references, segmentation))
     contacts = [tracker.measure_step([frame]) for frame in press.frames]
     return SampleResult(
         number=task.number,

@@ -65,13 +65,20 @@ class Method(Protocol):
     stages: tuple[str, ...]
     """The names of the stages' pictures in the order in which they come."""
 
-    def measure(self, image: Image, on_stage: StageSink | None = None, previous: "Contact | None" = None) -> Contact:
+    def measure(
+        self,
+        image: Image,
+        on_stage: StageSink | None = None,
+        previous: "Contact | None" = None,
+        agreed: float = 1.0,
+    ) -> Contact:
         """Find the contact in an image.
 
         Args:
             image: shape and channels as the reference's.
             on_stage: gets each stage's picture; nothing is drawn for it where it is None.
             previous: the same contact at the last step of less compression; a single image is measured without.
+            agreed: how far the frames agree of which the image is the mean, 0 to 1; the confidence is multiplied by it.
 
         Raises:
             ValueError: the image's shape or dtype is not the reference's.

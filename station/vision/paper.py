@@ -28,13 +28,20 @@ class PaperMethod:
         self._reference = reference
         self._parameters = parameters
 
-    def measure(self, image: Image, on_stage: StageSink | None = None, previous: Contact | None = None) -> Contact:
+    def measure(
+        self,
+        image: Image,
+        on_stage: StageSink | None = None,
+        previous: Contact | None = None,
+        agreed: float = 1.0,
+    ) -> Contact:
         """Find the contact in an image as the paper prints it.
 
         Args:
             image: shape (height, width, 3), dtype uint8, BGR, of the reference's size.
             on_stage: gets the pictures `difference`, `denoised` and `segmented`.
             previous: has no part in the method as printed.
+            agreed: nor has this.
 
         Raises:
             ValueError: the image's shape or dtype is not the reference's.

@@ -13,13 +13,11 @@ class PressTracker:
 
     Args:
         method: prepared for the press's reference.
-        least_confidence: the recipe's; below it a contact is flagged.
         first: the contact at the press's first step where that is measured already, for example by an approach.
     """
 
-    def __init__(self, method: Method, least_confidence: float, first: Contact | None = None) -> None:
-        self._method, self._least_confidence = method, least_confidence
-        self._previous = first
+    def __init__(self, method: Method, first: Contact | None = None) -> None:
+        self._method, self._previous = method, first
         self._ahead: dict[int, tuple[Image, Contact]] = {}
 
     def prepare_next(self, image: Image) -> None:
@@ -41,6 +39,6 @@ class PressTracker:
         """
         known = {key: contact for key, (_, contact) in self._ahead.items()}
         self._ahead.clear()
-        contact = measure_step(self._method, frames, self._least_confidence, self._previous, known)
+        contact = measure_step(self._method, frames, self._previous, known)
         self._previous = contact
         return contact

@@ -119,6 +119,8 @@ class State:
     """What this step itself shows of it, with the floor, at half the working size, 0 or 1."""
     flags: set[Flag] = field(default_factory=set)
     confidence: float = 0.0
+    agreed: float = 1.0
+    """How far the step's frames agree, 0 to 1."""
 
     @property
     def gate(self) -> float:
@@ -210,18 +212,26 @@ class RobustMethod:
             self._judge,
         )
 
-    def measure(self, image: Image, on_stage: StageSink | None = None, previous: Contact | None = None) -> Contact:
+    def measure(
+        self,
+        image: Image,
+        on_stage: StageSink | None = None,
+        previous: Contact | None = None,
+        agreed: float = 1.0,
+    ) -> Contact:
         """Find the contact in an image.
 
         Args:
             image: shape (height, width, 3), dtype uint8, BGR, of the references' size.
             on_stage: gets the pictures named in `stages`.
             previous: the same contact at the last step of less compression; a single image is measured without.
+            agreed: how far the frames agree of which the image is the mean, 0 to 1; the confidence is multiplied by it.
 
         Raises:
             ValueError: the image's shape or dtype is not the references'.
         """
         state = self._start(image, previous)
+        state.agreed = agreed
         difference = state.difference.copy() if on_stage else state.difference
         for stage in self.pipeline:
             stage(state)
@@ -410,12 +420,28 @@ class RobustMethod:
     def _keep_least(self, state: State) -> None:
         """Return at least what the step before did where no edge is trusted: compression only rises."""
         before, least = state.before, self._parameters.least_confidence
+        state.confidence = self._outlines_confidence(state)
         if before is None or not before.least.any() or self._parameters.contacts == "several":
             return
-        trusted = state.outlines and all(self._confidence(one, state) >= least for one in state.outlines)
-        if not trusted and state.load_levels >= self._constants.released_share * before.load_levels:
-            state.mask = state.mask | before.least
-            state.flags.add(Flag.LOWER_BOUND)
+        if state.confidence >= least or state.load_levels < self._constants.released_share * before.load_levels:
+            return
+        shown_px = round(cv2.countNonZero(state.mask) * state.changed.size / state.mask.size)
+        # An outline that hardly holds any change has been drawn around nothing.
+        drawn = cv2.countNonZero(state.changed) >= self._constants.witness_least * shown_px
+        held = state.mask | before.least if drawn else before.least
+        if not drawn or np.array_equal(held, before.least):
+            height, width = self._shape[:2]
+            changed = cv2.resize(state.changed, (width, height), interpolation=cv2.INTER_NEAREST)
+            held = held | np.asarray(changed * 255, np.uint8)
+        state.mask = held
+        state.flags.add(Flag.LOWER_BOUND)
+
+    def _outlines_confidence(self, state: State) -> float:
+        """The weakest outline's confidence, less where the changed area disagrees; 0 without an outline."""
+        confidence = min((self._confidence(one, state) for one in state.outlines), default=0.0)
+        if "witness" not in self._without:
+            confidence *= self._agreement(state, cv2.countNonZero(state.mask))
+        return confidence * state.agreed
 
     def _judge(self, state: State) -> None:
         """Set the flags, and the weakest contact's confidence; without a contact 1 to 0 as the threshold is reached."""
@@ -432,10 +458,7 @@ class RobustMethod:
             flags.add(Flag.UNDECIDED)
         if not touched:
             state.confidence = 0.0 if state.weak_at else min(1.0, p.sure_gate * max(0.0, 1.0 - state.gate))
-        else:
-            state.confidence = min((self._confidence(one, state) for one in state.outlines), default=0.0)
-            if "witness" not in self._without:
-                state.confidence *= self._agreement(state, cv2.countNonZero(state.mask))
+            state.confidence *= state.agreed
         if state.weak_at:
             state.confidence *= _WEAK_DOUBT
         if Flag.REFERENCE_MISMATCH in flags:

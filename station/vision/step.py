@@ -1,19 +1,16 @@
 """The contact of one width step, from all of its frames."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from station.vision.confidence import agreement
 from station.vision.contact import Contact, Image, Method
-from station.vocabulary import Flag
 
 
 def measure_step(
     method: Method,
     frames: Sequence[Image],
-    least_confidence: float,
     previous: Contact | None = None,
     known: Mapping[int, Contact] | None = None,
 ) -> Contact:
@@ -24,12 +21,11 @@ def measure_step(
     Args:
         method: prepared for the reference.
         frames: one or more of one shape (height, width, 3), dtype uint8, in which nothing has moved.
-        least_confidence: the recipe's; below it the contact is flagged.
         previous: the contact of the press's step before; None where the step is measured by itself.
         known: contacts of frames that are measured already, by the frame's `id`.
 
     Returns:
-        The mean image's contact. A confidence that the method gives is multiplied by the frames' `agreement`.
+        The mean image's contact, whose confidence is multiplied by the frames' `agreement`.
 
     Raises:
         ValueError: there is no frame, or they are not of the reference's shape and of one dtype.
@@ -40,12 +36,8 @@ def measure_step(
     if len(frames) == 1:
         return known.get(id(frames[0])) or method.measure(frames[0], previous=previous)
     alone = [known.get(id(frame)) or method.measure(frame, previous=previous) for frame in frames]
-    contact = method.measure(mean_image(frames), previous=previous)
-    if contact.confidence is None:
-        return contact
-    confidence = contact.confidence * agreement([one.area_px for one in alone])
-    doubted = frozenset({Flag.LOW_CONFIDENCE}) if confidence < least_confidence else frozenset[Flag]()
-    return replace(contact, confidence=confidence, flags=contact.flags | doubted)
+    agreed = agreement([one.area_px for one in alone])
+    return method.measure(mean_image(frames), previous=previous, agreed=agreed)
 
 
 def mean_image(frames: Sequence[Image]) -> Image:

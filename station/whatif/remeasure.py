@@ -48,7 +48,7 @@ def remeasured(stored: StoredPress, own: Segmentation, draft: Segmentation) -> P
     missing = [step for step in range(len(press.points)) if step not in decoded]
     if reference is None or missing:
         raise CannotRemeasureError(messages.IMAGES_NOT_KEPT())
-    before, after = (PressTracker(make_method([reference], one), one.robust.least_confidence) for one in (own, draft))
+    before, after = (PressTracker(make_method([reference], one)) for one in (own, draft))
     points = [_point(press, step, decoded, before, after, draft) for step in range(len(press.points))]
     if not points or points[0].area_px == 0:
         raise CannotRemeasureError(messages.OTHER_ONSET())

@@ -56,7 +56,7 @@ def read_table(path: Path) -> list[dict[str, str]]:
 def followed(references: Sequence[np.ndarray], frames: Sequence[np.ndarray]) -> list[Contact]:
     """The contacts of frames that are measured as one press."""
     segmentation = BLUEBERRY.segmentation
-    tracker = PressTracker(make_method(references, segmentation), segmentation.robust.least_confidence)
+    tracker = PressTracker(make_method(references, segmentation))
     return [tracker.measure_step([frame]) for frame in frames]
 
 

@@ -262,7 +262,7 @@ async def _inspect(folder: Path, fruit: int) -> None:
 def _pressed(shown: PressSequence, recipe, size: FruitSize) -> Press:
     """Measure its frames one after the other until the recipe stops the press."""
     method = make_method(shown.references, recipe.segmentation)
-    tracker = PressTracker(method, recipe.segmentation.robust.least_confidence)
+    tracker = PressTracker(method)
     count_mm = GripperCalibration().mm_per_count
     press = Press(shown.widths_mm[0], 0.1, (), size=size, resolution_mm=count_mm, scale_uncertainty=0.0125)
     for closing_mm, frame in zip(np.subtract(shown.closings_mm, TOUCHED_MM), shown.frames, strict=True):

@@ -240,13 +240,13 @@ def test_a_frame_that_was_measured_in_the_search_is_not_measured_again_to_confir
     class CountingMethod:
         """Remembers the level of each image that it measures."""
 
-        def measure(self, image: Any, previous: Any = None) -> Any:
+        def measure(self, image: Any, previous: Any = None, agreed: float = 1.0) -> Any:
             assert previous is None
             measured.append(int(image[0, 0, 0]))
             return SimpleNamespace(confidence=None, area_px=0)
 
     frames = tuple(SimpleNamespace(image=np.full((2, 2, 3), level, np.uint8)) for level in (10, 20, 60))
-    measurement = PressMeasurement(cast("Any", CountingMethod()), 0.5)
+    measurement = PressMeasurement(cast("Any", CountingMethod()))
     measurement.measure(Step(-1, Position(15.0), cast("Any", frames[:1])))
     measurement.measure(Step(0, Position(15.0), cast("Any", frames)))
     assert measured == [10, 20, 60, 30], "each frame once, then their mean"

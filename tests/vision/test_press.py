@@ -34,7 +34,7 @@ class SoftPress(NamedTuple):
     steps: list[Step]
 
     def tracker(self):
-        return PressTracker(RobustMethod(self.references, PARAMETERS), PARAMETERS.least_confidence)
+        return PressTracker(RobustMethod(self.references, PARAMETERS))
 
 
 def drawn(seed):
@@ -146,7 +146,7 @@ def test_bands_at_the_border_that_brighten_with_the_load_are_background_and_no_c
     for seed in SEEDS:
         _, sensor = drawn(seed)
         method = RobustMethod([sensor.frame(None, number / 30) for number in range(5)], PARAMETERS)
-        tracker = PressTracker(method, PARAMETERS.least_confidence)
+        tracker = PressTracker(method)
         # The dent is wide and even, as of a gel that is pushed as a whole: nothing of it is an edge.
         for number, bands_levels in enumerate((5.0, 15.0, 30.0)):
             even = np.full((320, 240), 0.3, np.float32)
@@ -188,16 +188,16 @@ class Counting:
     def __init__(self, method):
         self.method, self.stages, self.measured = method, method.stages, []
 
-    def measure(self, image, on_stage=None, previous=None):
+    def measure(self, image, on_stage=None, previous=None, agreed=1.0):
         self.measured.append(previous)
-        return self.method.measure(image, on_stage, previous)
+        return self.method.measure(image, on_stage, previous, agreed)
 
 
 @pytest.mark.parametrize("frames", [3, 1])
 def test_a_frame_that_is_measured_ahead_is_not_measured_again(presses, frames):
     one = presses[0]
     counting = Counting(RobustMethod(one.references, PARAMETERS))
-    ahead, plain = PressTracker(counting, PARAMETERS.least_confidence), one.tracker()
+    ahead, plain = PressTracker(counting), one.tracker()
     for step in one.steps[2:5]:
         taken = step.frames[:frames]
         ahead.prepare_next(taken[0])
@@ -210,7 +210,7 @@ def test_a_press_may_go_on_from_a_contact_that_an_approach_has_measured(presses,
     one = presses[0]
     approach = one.tracker().measure_step(one.steps[4].frames)
     method = RobustMethod(one.references, PARAMETERS)
-    tracker = PressTracker(method, PARAMETERS.least_confidence, first=approach)
+    tracker = PressTracker(method, first=approach)
     for step, contact in zip(one.steps[5:], followed[0][5:], strict=True):
         assert tracker.measure_step(step.frames).area_px == pytest.approx(contact.area_px, rel=0.1)
 
@@ -232,10 +232,34 @@ def test_each_tracker_follows_its_own_press(presses):
 def test_a_doubtful_step_returns_at_least_what_the_step_before_did_until_the_body_is_let_go():
     doubting = RobustParameters(least_confidence=1.0)
     one = press(0, covered=(0.3, 0.25, 0.0))
-    tracker = PressTracker(RobustMethod(one.references, doubting), doubting.least_confidence)
+    tracker = PressTracker(RobustMethod(one.references, doubting))
     larger, smaller, released = (tracker.measure_step(step.frames[:1]) for step in one.steps)
     assert Flag.LOW_CONFIDENCE in larger.flags
     assert Flag.LOWER_BOUND not in larger.flags
     assert not np.any((larger.mask > 0) & (smaller.mask == 0))
     assert {Flag.LOWER_BOUND, Flag.LOW_CONFIDENCE} <= smaller.flags
     assert not released.found
+
+
+def test_a_step_whose_frames_disagree_is_doubtful_and_returns_at_least_what_the_step_before_did():
+    one = press(0, covered=(0.3, 0.55, 0.68))
+    tracker = one.tracker()
+    before = tracker.measure_step(one.steps[0].frames)
+    mixed = tracker.measure_step([step.frames[0] for step in one.steps])
+    assert Flag.LOW_CONFIDENCE not in before.flags
+    assert {Flag.LOW_CONFIDENCE, Flag.LOWER_BOUND} <= mixed.flags
+    assert not np.any((before.mask > 0) & (mixed.mask == 0))
+
+
+def test_the_area_of_a_body_too_faint_for_an_edge_rises_with_what_has_changed():
+    foam = SoftBody(SoftKind.FOAM, 3, (40.0, 40.0), Foundation(plateau_mpa=0.02, knee_mm=0.2, hardening_per_mm=0.2))
+    contact, sensor = SoftOnGel(foam, Pose(240, 320)), DigitSensor(3, 503)
+    references = [sensor.frame(None, number / 30) for number in range(5)]
+    tracker = PressTracker(RobustMethod(references, PARAMETERS))
+    found = []
+    for number, share in enumerate(COVERED[4:-2]):
+        dent = contact.pressed(contact.compression_mm(share)).dent
+        frames = [sensor.frame(dent, 1.0 + number + k / 30, Condition(depth_shade=10.0)) for k in range(3)]
+        found.append(tracker.measure_step(frames))
+    assert all(one.flags & {Flag.LOW_CONFIDENCE, Flag.UNDECIDED} for one in found)
+    assert np.all(np.diff([one.area_px for one in found]) > 0)

@@ -48,10 +48,10 @@ def seen_images(monkeypatch, previous_contacts):
     def counting(references, segmentation):
         method = make_method(references, segmentation)
 
-        def measure(image, on_stage=None, previous=None):
+        def measure(image, on_stage=None, previous=None, agreed=1.0):
             seen.append(id(image))
             previous_contacts.append(previous)
-            return method.measure(image, on_stage, previous)
+            return method.measure(image, on_stage, previous, agreed)
 
         return SimpleNamespace(stages=method.stages, measure=measure)
 
@@ -77,7 +77,7 @@ def test_a_step_whose_frames_were_measured_as_they_came_is_measured_the_same_and
     assert len(seen_images) == 4  # and their mean
     median = np.median([each.image for each in references], axis=0).astype(np.uint8)
     method = make_method([median], BLUEBERRY.segmentation)
-    plain = measure_step(method, [each.image for each in frames], BLUEBERRY.segmentation.robust.least_confidence)
+    plain = measure_step(method, [each.image for each in frames])
     assert plain.found
     assert (seen.contact.area_px, seen.contact.confidence) == (plain.area_px, plain.confidence)
     assert (seen.contact.mask == plain.mask).all()
@@ -128,8 +128,7 @@ def test_a_press_is_followed_from_its_first_contact_until_the_next_reference(tmp
     assert len(previous_contacts) == len(expected), "no frame was measured twice"
     assert all(one is other for one, other in zip(previous_contacts, expected, strict=True))
     median = np.median([frame(seed).image for seed in range(3)], axis=0).astype(np.uint8)
-    least = BLUEBERRY.segmentation.robust.least_confidence
-    tracker = PressTracker(make_method([median], BLUEBERRY.segmentation), least, first=contacts[0])
+    tracker = PressTracker(make_method([median], BLUEBERRY.segmentation), first=contacts[0])
     again = [tracker.measure_step([each.image for each in frames]) for frames in steps[2:]]
     assert [one.area_px for one in again] == [one.area_px for one in contacts[1:]]
     assert [one.confidence for one in again] == [one.confidence for one in contacts[1:]]
