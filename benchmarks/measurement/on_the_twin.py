@@ -18,6 +18,7 @@ from station.twin.gel import MM_PER_PX, Gel
 from station.twin.squeeze import Squeeze
 from station.vision.contact import Image
 from station.vision.methods import median_image
+from station.vision.press import PressTracker
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image, measure_step
 from station.vision.working import working_image
@@ -134,6 +135,8 @@ class Measured(NamedTuple):
     """One step of the twin: its keys in the table, and what was found against the truth."""
 
     keys: tuple[str, str]
+    followed: bool
+    """Measured as a step of its press, as the station does it, or by itself."""
     press: int
     true_mm2: float
     error: float
@@ -155,34 +158,38 @@ def measured_presses(seeds: Sequence[int], kinds: Sequence[str] = FRUITS, *, bru
     for seed in seeds:
         for number, (kind, name, press) in enumerate(twin_presses(seed, kinds, bruised=bruised)):
             method, peer = RobustMethod(press.references, parameters), contact_area_idea(median_image(press.references))
+            tracker = PressTracker(method)
             for step in press.steps:
-                contact = measure_step(method, step.frames)
-                area_px, single_px = contact.area_px, method.measure(step.frames[0]).area_px
+                contacts = {True: tracker.measure_step(step.frames), False: measure_step(method, step.frames)}
+                single_px = method.measure(step.frames[0]).area_px
                 peer_px = int(np.count_nonzero(peer(mean_image(step.frames))))
-                areas_px = (area_px, single_px, peer_px)
-                error, single_error, peer_error = (abs(px / max(1, step.true_px) - 1) for px in areas_px)
-                undecided = Flag.UNDECIDED in contact.flags
-                judged = not undecided and Flag.LOW_CONFIDENCE not in contact.flags
-                found.append(
-                    Measured(
-                        (kind, name),
-                        1000 * seed + number,
-                        step.true_mm2,
-                        error,
-                        single_error,
-                        area_px,
-                        peer_error,
-                        peer_px,
-                        judged,
-                        undecided,
+                for followed, contact in contacts.items():
+                    areas_px = (contact.area_px, single_px, peer_px)
+                    error, single_error, peer_error = (abs(px / max(1, step.true_px) - 1) for px in areas_px)
+                    undecided = Flag.UNDECIDED in contact.flags
+                    judged = not undecided and Flag.LOW_CONFIDENCE not in contact.flags
+                    found.append(
+                        Measured(
+                            (kind, name),
+                            followed,
+                            1000 * seed + number,
+                            step.true_mm2,
+                            error,
+                            single_error,
+                            contact.area_px,
+                            peer_error,
+                            peer_px,
+                            judged,
+                            undecided,
+                        )
                     )
-                )
     return found
 
 
 def twin_table() -> list[str]:
     """The robust method on the twin, where the truth is exact."""
-    found = measured_presses(TWIN_SEEDS)
+    every = measured_presses(TWIN_SEEDS)
+    found = [one for one in every if one.followed]
     large = [one for one in found if one.true_mm2 > 2]
     light, firm = ([one.error for one in large if (one.true_mm2 > FIRM_MM2) == heavy] for heavy in (False, True))
     single = [one.single_error for one in large]
@@ -191,7 +198,7 @@ def twin_table() -> list[str]:
     wrong, right = ([one for one in large if (one.error > LARGE_ERROR) == much] for much in (True, False))
     flagged = [np.mean([not one.judged for one in some]) for some in (wrong, right)]
     return [
-        *errors_table(large, ("all", *FRUITS, *conditions())),
+        *errors_table(every, ("all", *FRUITS, *conditions())),
         "",
         f"Median and p95 up to {FIRM_MM2} mm²: {median_and_p95(light, ' and ')};",
         f"over it: {median_and_p95(firm, ' and ')}.",
@@ -206,12 +213,13 @@ def twin_table() -> list[str]:
 
 def bruised_table() -> list[str]:
     """As `twin_table`, of bruised fruit: softer, so that they touch more of the gel and less firmly."""
-    large = [one for one in measured_presses(BRUISED_SEEDS, BRUISED_FRUITS, bruised=True) if one.true_mm2 > 2]
+    every = measured_presses(BRUISED_SEEDS, BRUISED_FRUITS, bruised=True)
+    large = [one for one in every if one.followed and one.true_mm2 > 2]
     wrong = [one for one in large if one.error > LARGE_ERROR]
     light, firm = ([one.error for one in large if (one.true_mm2 > FIRM_MM2) == heavy] for heavy in (False, True))
     flagged = np.mean([not one.judged for one in wrong])
     return [
-        *errors_table(large, ("all", *BRUISED_FRUITS)),
+        *errors_table(every, ("all", *BRUISED_FRUITS)),
         "",
         f"Median and p95 up to {FIRM_MM2} mm²: {median_and_p95(light, ' and ')};",
         f"over it: {median_and_p95(firm, ' and ')}.",
@@ -219,15 +227,18 @@ def bruised_table() -> list[str]:
     ]
 
 
-def errors_table(large: Sequence[Measured], keys: Sequence[str]) -> list[str]:
-    """The errors of all that any of the keys names, and of what of it would be judged."""
+def errors_table(found: Sequence[Measured], keys: Sequence[str]) -> list[str]:
+    """The errors of all that any of the keys names, followed and at last by itself, and of what would be judged."""
     header = (
         "| contacts over 2 mm² | steps | error of the area: median | p95 | judged | their median | their p95 "
         "| Spearman with closing: median | 0.99 or more | of the judged |"
     )
     lines = [header, "|---|---|---|---|---|---|---|---|---|---|"]
-    for key in keys:
-        rows = [one for one in large if key == "all" or key in one.keys]
+    large, alone = (
+        [one for one in found if one.true_mm2 > 2 and one.followed is followed] for followed in (True, False)
+    )
+    sets = {key: [one for one in large if key == "all" or key in one.keys] for key in keys}
+    for key, rows in {**sets, "all, each step by itself": alone}.items():
         judged = [one for one in rows if one.judged]
         ranks, sure = (ranks_of(some, {one.press for one in rows}) for some in (rows, judged))
         lines.append(
