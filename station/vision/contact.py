@@ -123,9 +123,9 @@ def contact_from_mask(
             changed_area_px=changed_area_px,
             trace=trace,
         )
-    left, top, width, height = cv2.boundingRect(mask)
-    moments = cv2.moments(mask[top : top + height, left : left + width], binaryImage=True)
-    centroid_px = (left + moments["m10"] / area_px, top + moments["m01"] / area_px)
-    if left == 0 or top == 0 or left + width == mask.shape[1] or top + height == mask.shape[0]:
+    # `cv2.moments` of a mask takes ten times as long.
+    across, down = (cv2.reduce(mask, axis, cv2.REDUCE_SUM, dtype=cv2.CV_32S).ravel() for axis in (0, 1))
+    x_px, y_px = (float(sums @ np.arange(sums.size)) / (255 * area_px) for sums in (across, down))
+    if across[0] or across[-1] or down[0] or down[-1]:
         flags |= {Flag.CUT_BY_BORDER}
-    return Contact(mask, area_px, centroid_px, flags, confidence, gate, drift_levels, is_light, changed_area_px, trace)
+    return Contact(mask, area_px, (x_px, y_px), flags, confidence, gate, drift_levels, is_light, changed_area_px, trace)
