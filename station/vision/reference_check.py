@@ -11,8 +11,8 @@ the same unit, untouched or pressed, and about 0.8 for another. A unit whose pat
 import cv2
 import numpy as np
 
-from station.vision.contact import FloatImage, Image
-from station.vision.working import SATURATED_LEVEL, length_squared
+from station.vision.contact import FloatImage
+from station.vision.working import length_squared, resized
 
 _CELLS = 80
 """Cells along the long side, 4 px of a 320 px image: finer pattern is lost in noise, compression and shifts."""
@@ -34,26 +34,26 @@ class ReferenceCheck:
     """Compares frames with one reference.
 
     Args:
-        reference: the untouched gel at the working size, shape (height, width, 3), dtype uint8.
+        reference: the untouched gel, cut off where it saturates, at half the working size, shape (height, width, 3),
+            grey levels.
     """
 
-    def __init__(self, reference: Image) -> None:
+    def __init__(self, reference: FloatImage) -> None:
         self._cells = _cells(reference)
         self._pattern = _pattern(self._cells)
         self._energy = length_squared(self._pattern)
 
-    def mismatch(self, frame: Image) -> float:
+    def mismatch(self, frame: FloatImage) -> float:
         """The statistic over its threshold: above 1 the frame shows another unit, or another sensor.
 
         Args:
-            frame: at the working size, shape and dtype as the reference's.
+            frame: cut off and averaged down as the reference.
         """
         cells = _cells(frame)
         _, spread = cv2.meanStdDev(cells - self._cells)
         # A gain or an offset of a colour says nothing about the unit: only what varies over the frame is compared.
-        light_levels = float(np.sqrt(np.mean(np.square(spread))))
-        missing = self._missing_share(_pattern(cells))
-        return min(missing / _MOST_MISSING, light_levels / _LEAST_LIGHT_CHANGE_LEVELS)
+        light = float(np.sqrt(np.mean(np.square(spread)))) / _LEAST_LIGHT_CHANGE_LEVELS
+        return light if light <= 1 else min(light, self._missing_share(_pattern(cells)) / _MOST_MISSING)
 
     def _missing_share(self, pattern: FloatImage) -> float:
         """One minus the slope of a frame's pattern on the reference's, 0 for the same unit.
@@ -71,14 +71,12 @@ class ReferenceCheck:
         return 1.0 - found / expected
 
 
-def _cells(image: Image) -> FloatImage:
-    """An image averaged over cells, saturation cut off, shape (rows, columns, 3), grey levels."""
+def _cells(image: FloatImage) -> FloatImage:
+    """An image averaged over cells, in whole grey levels, shape (rows, columns, 3)."""
     height, width = image.shape[:2]
     scale = _CELLS / max(height, width)
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
-    # Cut off before the average: beyond this level the sensor's own processing hides changes.
-    cut_off = cv2.threshold(image, SATURATED_LEVEL, 0, cv2.THRESH_TRUNC)[1]
-    return cv2.resize(cut_off, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+    return np.rint(resized(image, size))
 
 
 def _pattern(cells: FloatImage) -> FloatImage:

@@ -169,12 +169,12 @@ class RobustMethod:
         self._shape, self._parameters, self._constants, self._without = shape, parameters, constants, without
         reference = references[0] if len(references) == 1 else np.median(np.stack(references), axis=0).astype(np.uint8)
         self._reference = working_image(reference)
-        self._check = ReferenceCheck(self._reference)
         self._model = BackgroundModel(self._reference, constants)
         light = clipped(self._reference)
         height, width = light.shape[:2]
         self._half = (-(-width // 2), -(-height // 2))
         self._light = resized(light, self._half)
+        self._check = ReferenceCheck(self._light)
         self._light_levels = float(np.sqrt(np.mean(self._light**2)))
         self._flat_field = flat_field_correction(self._light, constants)
         if "flat field" in without:
@@ -277,7 +277,7 @@ class RobustMethod:
 
     def _check_reference(self, state: State) -> None:
         """Flag a frame of another sensor than the reference's."""
-        if "reference check" not in self._without and self._check.mismatch(state.work) > 1:
+        if "reference check" not in self._without and self._check.mismatch(state.frame) > 1:
             state.flags.add(Flag.REFERENCE_MISMATCH)
 
     def _subtract_background(self, state: State) -> None:

@@ -48,7 +48,9 @@ def resized(field: FloatImage, size: tuple[int, int]) -> FloatImage:
     if size == (field.shape[1], field.shape[0]):
         return field
     shrinking = size[0] < field.shape[1]
-    method = cv2.INTER_AREA if shrinking else cv2.INTER_LINEAR
+    # At exactly half the size the linear mean is the average too, and of colours it takes a third of the time.
+    halving = field.ndim == 3 and (2 * size[0], 2 * size[1]) == (field.shape[1], field.shape[0])
+    method = cv2.INTER_AREA if shrinking and not halving else cv2.INTER_LINEAR
     return np.asarray(cv2.resize(np.ascontiguousarray(field, np.float32), size, interpolation=method), np.float32)
 
 

@@ -9,9 +9,10 @@ from station.twin.digit.sensor import DigitSensor
 from station.twin.fruit import draw_fruit
 from station.twin.gel import Gel
 from station.twin.squeeze import Squeeze
+from station.vision.contact import FloatImage
 from station.vision.methods import median_image
 from station.vision.reference_check import ReferenceCheck
-from station.vision.working import working_image
+from station.vision.working import clipped, resized, working_image
 from tests.conftest import SHARED
 
 BACKGROUNDS = SHARED / "data" / "digit_backgrounds"
@@ -19,9 +20,14 @@ SAME_UNIT = {"background_01.jpg", "background_02.jpg"}
 """One unit on two days."""
 
 
+def halved(image: np.ndarray) -> FloatImage:
+    work = working_image(np.asarray(image, np.uint8))
+    return resized(clipped(work), (work.shape[1] // 2, work.shape[0] // 2))
+
+
 def sensor_and_check(unit: int | None) -> tuple[DigitSensor, ReferenceCheck]:
     sensor = DigitSensor(1, unit)
-    return sensor, ReferenceCheck(working_image(median_image([sensor.frame(None, k / 30) for k in range(5)])))
+    return sensor, ReferenceCheck(halved(median_image([sensor.frame(None, k / 30) for k in range(5)])))
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +47,7 @@ def test_a_press_on_the_same_unit_matches_and_on_another_does_not(units, kind, c
     pressed = FruitOnGel(fruit, Pose(), Gel()).pressed(Squeeze(fruit, Gel()).at(closing_mm))
     same, foreign = [], []
     for own, (sensor, _) in enumerate(units):
-        frame = working_image(sensor.frame(pressed.dent if closing_mm else None, 8.0))
+        frame = halved(sensor.frame(pressed.dent if closing_mm else None, 8.0))
         for other, (_, check) in enumerate(units):
             (same if other == own else foreign).append(check.mismatch(frame) > 1)
     assert not any(same)
@@ -59,9 +65,9 @@ def test_noise_compression_drift_and_a_small_shift_are_no_other_unit(units):
         shifted = np.roll(drifted, 2, axis=(0, 1)) + generator.normal(0, 3, drifted.shape)
         for quality in (95, 30):
             image = compressed(np.clip(shifted, 0, 255).astype(np.uint8), quality)
-            assert check.mismatch(working_image(image)) < 1
-            small = np.asarray(cv2.resize(image, (width // 2, height // 2), interpolation=cv2.INTER_AREA), np.uint8)
-            assert check.mismatch(working_image(small)) < 1
+            assert check.mismatch(halved(image)) < 1
+            small = cv2.resize(image, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+            assert check.mismatch(halved(small)) < 1
 
 
 def test_a_pattern_too_weak_to_recognise_is_no_other_unit():
@@ -69,11 +75,11 @@ def test_a_pattern_too_weak_to_recognise_is_no_other_unit():
     smooth = np.stack([90 + 40 * x, 120 - 30 * y, 80 + 20 * x * y], axis=-1)
     generator = np.random.default_rng(2)
     reference, frame = ((smooth + generator.normal(0, 2, smooth.shape)).astype(np.uint8) for _ in range(2))
-    assert ReferenceCheck(reference).mismatch(frame) < 1
+    assert ReferenceCheck(halved(reference)).mismatch(halved(frame)) < 1
 
 
 def test_identical_images_match_exactly():
-    image = np.random.default_rng(3).integers(0, 255, (320, 240, 3), dtype=np.uint8)
+    image = halved(np.random.default_rng(3).integers(0, 255, (320, 240, 3), dtype=np.uint8))
     assert ReferenceCheck(image).mismatch(image) == pytest.approx(0, abs=1e-5)
 
 
@@ -82,9 +88,9 @@ def test_real_units():
     images = {path.name: np.asarray(cv2.imread(str(path)), np.uint8) for path in sorted(BACKGROUNDS.glob("*.jpg"))}
     same, foreign = [], []
     for name, reference in images.items():
-        check = ReferenceCheck(reference)
+        check = ReferenceCheck(halved(reference))
         for other, image in images.items():
             is_same = name == other or {name, other} == SAME_UNIT
-            (same if is_same else foreign).append(check.mismatch(compressed(image, 40)) > 1)
+            (same if is_same else foreign).append(check.mismatch(halved(compressed(image, 40))) > 1)
     assert sum(same) == 0
     assert sum(foreign) >= 0.98 * len(foreign)
