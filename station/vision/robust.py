@@ -448,10 +448,7 @@ class RobustMethod:
         p, flags, work = self._constants, state.flags, state.work
         if state.background.strength_levels > p.most_drift_share * self._light_levels:
             flags.add(Flag.REFERENCE_MISMATCH)
-        inside = cv2.resize(state.mask, (work.shape[1], work.shape[0]), interpolation=cv2.INTER_NEAREST) > 0
-        blue, green, red = cv2.split(work)
-        saturated = cv2.max(cv2.max(blue, green), red) >= SATURATED_LEVEL
-        if np.mean(saturated[inside] if inside.any() else saturated) > p.saturated_share:
+        if work.max() >= SATURATED_LEVEL and _saturated_share(work, state.mask) > p.saturated_share:
             flags.add(Flag.SATURATED)
         touched = bool(state.outlines) or Flag.LOWER_BOUND in flags
         if not touched and (state.gate > 1 or state.weak_at):
@@ -571,3 +568,13 @@ class RobustMethod:
             edges=[outline.edge for outline in state.outlines],
             mask=state.mask,
         )
+
+
+def _saturated_share(image: Image, mask: Mask) -> float:
+    """How much of an image is saturated within a mask of any size, or everywhere where the mask is empty, 0 to 1."""
+    blue, green, red = cv2.split(image)
+    saturated = (cv2.max(cv2.max(blue, green), red) >= SATURATED_LEVEL).view(np.uint8)
+    inside = cv2.resize(mask, (image.shape[1], image.shape[0]), interpolation=cv2.INTER_NEAREST)
+    if (inside_px := cv2.countNonZero(inside)) == 0:
+        return cv2.countNonZero(saturated) / saturated.size
+    return cv2.countNonZero(cv2.bitwise_and(saturated, inside)) / inside_px

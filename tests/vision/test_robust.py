@@ -383,6 +383,17 @@ def test_confidence_falls_with_the_contrast(sphere_press):
     assert confidences[0] > confidences[-1] + 0.05
 
 
+@pytest.mark.parametrize(("glare", "flagged"), [((240, 320), True), ((60, 60), False)])
+def test_a_contact_of_which_more_than_a_little_is_saturated_is_flagged(sphere_press, glare, flagged):
+    press = sphere_press(240, 320, 90)
+    reference, image = (
+        cv2.circle(one.copy(), glare, 30, (255, 255, 255), cv2.FILLED) for one in (press.reference, press.image)
+    )
+    contact = measure(reference, image)
+    assert contact.found
+    assert (Flag.SATURATED in contact.flags) is flagged
+
+
 def test_several_references_are_their_median(sphere_press, overlap):
     press = sphere_press()
     references = [sphere_press(seed=seed).reference for seed in range(3)]
