@@ -43,6 +43,12 @@ def test_an_outline_is_drawn_at_the_size_of_the_input(outlined, textured):
     assert drawn.shape == (640, 480)
     assert set(np.unique(drawn)) == {0, 255}
     assert np.count_nonzero(drawn) == pytest.approx(16 * np.count_nonzero(AWAY < 18), rel=0.05)
+    assert np.mean(np.nonzero(drawn), axis=1) == pytest.approx((4 * 80, 4 * 60), abs=4)
+
+
+def test_outlines_that_are_alike_are_told_apart(outlined):
+    one, other = outlined(textured=False), outlined(textured=False)
+    assert other != one
 
 
 @pytest.mark.parametrize(("kind", "closing_mm", "rel"), [("raspberry", 0.6, 0.3), ("strawberry", 0.6, 0.35)])
