@@ -137,7 +137,7 @@ class BackgroundModel:
             fitted = (self._coarse @ change)[..., 0]
             residual = np.sqrt(((samples - fitted) ** 2).sum(axis=0))
             if weight.sum() >= _LEAST_KNOWN * weight.size:
-                spread = float(np.clip(weighted_median(residual, weight), _LEAST_SPREAD_LEVELS, p.most_spread))
+                spread = min(max(weighted_median(residual, weight), _LEAST_SPREAD_LEVELS), p.most_spread)
             weight = np.square(np.maximum(0, 1 - np.square(residual / np.float32(_TUKEY_WIDTH * spread)))) * trust
         coefficients = expected + change
         strength = float(np.sqrt(np.mean((fitted + expected_levels) ** 2)))
@@ -151,11 +151,15 @@ class BackgroundModel:
         waves = np.zeros((3, len(self._upward), len(self._along)), np.float32)
         waves[:, self._places[1], self._places[0]] = coefficients[:, 1:end]
         lines = self._upward.T @ _rows((waves @ self._along).transpose(1, 2, 0))
+        gain, *displaced = np.tile(coefficients[:, [0, *range(end, coefficients.shape[1])]].T, self._half[0])
+        part = np.empty_like(lines)
         for number, slope in enumerate(self._slopes):
-            displaced = coefficients[:, end + 3 * number : end + 3 * number + 3].T
-            still, along, up = np.tile(displaced, self._half[0]).astype(np.float32)
-            lines += slope * ((still + along * self._across) + up * self._down)
-        lines += _rows(self._light) * np.tile(coefficients[:, 0], self._half[0]).astype(np.float32)
+            still, along, up = displaced[3 * number : 3 * number + 3]
+            np.multiply(up, self._down, out=part)
+            part += still + along * self._across
+            part *= slope
+            lines += part
+        lines += np.multiply(_rows(self._light), gain, out=part)
         return lines.reshape(self._half[1], self._half[0], 3)
 
 
@@ -199,7 +203,7 @@ def destriped(change: FloatImage, background: FloatImage, constants: Constants) 
 def _offsets(strips: FloatImage, background: FloatImage, axis: int, constants: Constants) -> FloatImage:
     """The lines' offsets along an axis, of length 1 along it."""
     # Twice as many strips as the known share have to be background before a line's own mean is believed.
-    known = np.clip(float(background.mean()) / constants.known_share, _LEAST_KNOWN, 1)
+    known = min(max(float(background.mean()) / constants.known_share, _LEAST_KNOWN), 1)
     prior = strips.shape[axis] * min(constants.stripe_prior / known**2, 0.1)
     away = length_squared(strips - _line_means(strips, background, axis, _NO_PRIOR))
     limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), _LEAST_SPREAD_LEVELS**2)
@@ -248,6 +252,16 @@ def quantile(values: npt.NDArray[np.floating], share: float) -> float:
         values: any shape, not empty.
         share: 0 to 1.
     """
+    return quantiles(values, share)[0]
+
+
+def quantiles(values: npt.NDArray[np.floating], *shares: float) -> list[float]:
+    """Several quantiles, as `quantile`, in one pass.
+
+    Args:
+        values: any shape, not empty.
+        shares: 0 to 1.
+    """
     values = values.ravel()
-    place = int(share * (values.size - 1))
-    return float(np.partition(values, place)[place])
+    places = [int(share * (values.size - 1)) for share in shares]
+    return [float(one) for one in np.partition(values, places)[places]]

@@ -44,14 +44,15 @@ def body_candidates(moved: Movement, threshold: float, constants: Constants) -> 
         constants: window and share.
     """
     curvature = moved.curvature
-    level, spread = level_of(moved, constants.level_window)
+    seen = level_of(moved, constants.level_window)
+    level = seen.levels
     strongest = float(curvature.max())
     if strongest <= threshold:
         return Candidates([], level)
     strong = level[curvature > min(threshold, _STRONG_SHARE * strongest)]
-    lowest = max(_OVER_SPREAD * spread, constants.candidate_share * quantile(strong, _LOW_QUANTILE))
-    seen = ((level > lowest) | (curvature > threshold)).astype(np.uint8)
-    found = [part for part in _parts(seen) if curvature[part > 0].max() > threshold]
+    lowest = max(_OVER_SPREAD * seen.spread(moved), constants.candidate_share * quantile(strong, _LOW_QUANTILE))
+    standing_out = ((level > lowest) | (curvature > threshold)).astype(np.uint8)
+    found = [part for part in _parts(standing_out) if curvature[part > 0].max() > threshold]
     return Candidates(_heaviest_first(level, found), level)
 
 
@@ -63,7 +64,7 @@ def around(place: tuple[int, int], moved: Movement, constants: Constants) -> Can
         moved: from `region.movement`.
         constants: the level's window.
     """
-    level, _ = level_of(moved, constants.level_window)
+    level = level_of(moved, constants.level_window).levels
     return Candidates([disc(level.shape, place, _WEAK_RADIUS_PX)], level)
 
 

@@ -28,7 +28,7 @@ def changed(moved: Movement, noise_levels: float, constants: Constants) -> Mask:
     Returns:
         Shape (height, width) at half the working size, 0 or 1.
     """
-    length = np.sqrt(moved.squared) * moved.flat_field
+    length = moved.length * moved.flat_field
     return (length > max(constants.changed_levels, _NOISES * noise_levels)).astype(np.uint8)
 
 

@@ -1,5 +1,6 @@
 """Confidence: how far the image supports an area."""
 
+import statistics
 from collections.abc import Sequence
 
 import numpy as np
@@ -39,9 +40,9 @@ def edge_confidence(edge: Edge, noise_levels: float, constants: Constants) -> fl
     """
     if not edge.seen.any():
         return 0.0
-    ratio = edge.drop_levels[edge.seen] / max(noise_levels, _LEAST_NOISE_LEVELS)
-    signal = max(0.0, float(np.median(ratio)))
-    support = float(np.mean(ratio > 0))
+    ratios = (edge.drop_levels[edge.seen] / max(noise_levels, _LEAST_NOISE_LEVELS)).tolist()
+    signal = max(0.0, statistics.median(ratios))
+    support = sum(ratio > 0 for ratio in ratios) / len(ratios)
     return support * signal**2 / (signal**2 + constants.reliable_ratio**2)
 
 

@@ -123,7 +123,6 @@ class Constants:
         0.38, "", "logarithm of the areas at two levels at which the confidence is halved", "fit"
     )
     # Contour
-    contour_blur: float = constant(1.0, "px", "smoothing before the edge", "fit", "half")
     strong_quantile: float = constant(0.75, "", "quantile of the rays' falls that is called strong", "fit")
     least_steepness: float = constant(0.4, "of a strong fall", "a fall below it is no edge", "fit")
     highest_harmonic: float = constant(3.0, "", "of the start's radius around the circle", "fit")

@@ -6,6 +6,7 @@ towards the flat centre is none. The steepest closed path over all rays that doe
 programming (Viterbi), twice: about the region's middle and about the first path's.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
@@ -15,12 +16,10 @@ import numpy.typing as npt
 
 from station.vision.constants import Constants
 from station.vision.contact import FloatImage, Mask
-from station.vision.working import length_squared
 
 RAYS = 64
-_FIRST_SPAN, _FIRST_STEPS = (0.3, 1.2), 32
-_SECOND_SPAN, _SECOND_STEPS = (0.6, 1.4), 64
-"""In radii, from where to where the edge is looked for about the region's middle and about the first path's."""
+_FIRST_SHARES, _SECOND_SHARES = np.linspace(0.3, 1.2, 32), np.linspace(0.6, 1.4, 64)
+"""In radii, where the edge is looked for about the region's middle and about the first path's."""
 _LONGEST_JUMP = 2
 _SIDE_SHARE = 0.15
 """Of the radius: on either side of the edge, where the drop across it is read."""
@@ -50,21 +49,25 @@ class Rays(NamedTuple):
         """
         # Sums over every second row and column: `cv2.moments` of a mask takes forty times as long.
         inside = (mask[::2, ::2] > 0).astype(np.float32)
-        y, x = (2 * np.arange(side, dtype=np.float32) + np.float32(0.5) for side in inside.shape)
-        columns, rows = inside.sum(axis=0), inside.sum(axis=1)
+        y, x = (np.arange(0.5, 2 * side, 2, dtype=np.float32) for side in inside.shape)
+        columns, rows = cv2.reduce(inside, 0, cv2.REDUCE_SUM)[0], cv2.reduce(inside, 1, cv2.REDUCE_SUM)[:, 0]
         area = max(1.0, float(columns.sum()))
         middle = (float(columns @ x) / area, float(rows @ y) / area)
         x, y = x - np.float32(middle[0]), y - np.float32(middle[1])
         xx, yy, xy = (float(value) / area for value in (columns @ (x * x), rows @ (y * y), y @ inside @ x))
-        values, vectors = np.linalg.eigh(np.array([[xx + 1, xy], [xy, yy + 1]]))
-        aspect = float(np.interp(np.sqrt(values[1] / values[0]), _ASPECTS, _STRETCHES))
-        axes = vectors @ np.diag([aspect**-0.5, aspect**0.5]) @ vectors.T
-        return cls(middle, axes)
+        # The covariance's eigenvalues, a pixel's own added, are mean + apart and mean - apart.
+        mean, turned = (xx + yy) / 2 + 1, (xx - yy) / 2
+        apart = math.hypot(turned, xy)
+        aspect = float(np.interp(math.sqrt((mean + apart) / (mean - apart)), _ASPECTS, _STRETCHES))
+        even, longer = (aspect**0.5 + aspect**-0.5) / 2, (aspect**0.5 - aspect**-0.5) / 2
+        cosine, sine = (turned / apart, xy / apart) if apart else (1.0, 0.0)  # of twice the long axis's angle
+        return cls(middle, np.array([[even + longer * cosine, longer * sine], [longer * sine, even - longer * cosine]]))
 
     @property
     def across(self) -> float:
         """By how much a body is narrower than a circle of its area, 0 to 1; 1 of all that are not long."""
-        return float(np.linalg.norm(self.axes, -2))
+        even = float(self.axes[0, 0] + self.axes[1, 1]) / 2  # the mean of two eigenvalues whose product is 1
+        return even - math.sqrt(max(0.0, even**2 - 1))
 
     def reach(self, mask: Mask) -> float:
         """The radius of a circle of a region's area, in the rays' unit, at least 3.
@@ -84,9 +87,9 @@ class Rays(NamedTuple):
         Returns:
             x and y, each of shape (rays, steps), dtype float32, px.
         """
-        across, down = self.axes @ _CIRCLE[:, ::every]
-        x, y = self.middle[0] + across[:, None] * away, self.middle[1] + down[:, None] * away
-        return x.astype(np.float32), y.astype(np.float32)
+        directions = self.axes @ _CIRCLE[:, ::every]
+        x, y = (np.array(self.middle)[:, None, None] + directions[:, :, None] * away).astype(np.float32)
+        return x, y
 
     def points(self, radii: _Floats) -> _Floats:
         """The point at one distance on each ray, shape (64, 2).
@@ -129,20 +132,6 @@ class Edge:
     """Shape (64,): by how much the change falls across the edge there, grey levels."""
 
 
-def change_length(change: FloatImage, constants: Constants) -> FloatImage:
-    """The change's smoothed length over the channels.
-
-    Args:
-        change: without background, at half the working size, shape (height, width, 3), grey levels.
-        constants: how much is smoothed.
-
-    Returns:
-        Shape (height, width), grey levels.
-    """
-    smooth = cv2.GaussianBlur(change, (0, 0), constants.contour_blur)
-    return np.asarray(cv2.sqrt(length_squared(np.asarray(smooth, np.float32))), np.float32)
-
-
 def find_edge(
     length: FloatImage,
     region: Mask,
@@ -155,7 +144,7 @@ def find_edge(
     """Find the edge of the contact in a region; a contact that the border cuts is completed by its mirror image.
 
     Args:
-        length: from `change_length`, shape (height, width), grey levels.
+        length: of the smoothed change, shape (height, width), grey levels.
         region: where the contact lies, halo and all, shape (height, width), 0 or not.
         rays: the region's, at that size.
         radii: how far the region reaches on them, shape (64,).
@@ -187,10 +176,10 @@ def _closed_edge(
     if seen.any() and not seen.all():  # beyond the border the region says nothing: as far as it reaches elsewhere
         radii = np.where(seen, radii, np.maximum(radii, np.median(radii[seen])))
     radii = _smooth(radii, constants.highest_harmonic)
-    radii, _ = _steepest(length, rays, radii, np.linspace(*_FIRST_SPAN, _FIRST_STEPS), stiffness, constants, floor)
+    radii, _ = _steepest(length, rays, radii, _FIRST_SHARES, stiffness, constants, floor)
     rays, radii = rays.moved_to(rays.points(radii), shape)
     radii = _smooth(radii, constants.highest_harmonic)
-    radii, drop = _steepest(length, rays, radii, np.linspace(*_SECOND_SPAN, _SECOND_STEPS), stiffness, constants, floor)
+    radii, drop = _steepest(length, rays, radii, _SECOND_SHARES, stiffness, constants, floor)
     points = rays.points(radii)
     return Edge(points, inside_image(points, shape), drop)
 
@@ -280,30 +269,45 @@ def closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArray
         Shape (rays,): the step on each ray.
     """
     rays, steps = cost.shape
-    turns = np.concatenate([cost, cost[: rays // 2]]).astype(np.float32)
-    half = len(turns) // 2
-    between = np.full((half, _LONGEST_JUMP), np.inf, np.float32)
-    both = np.concatenate([turns[:half], between, turns[: half - 1 : -1]], axis=1)
-    other, width = steps + _LONGEST_JUMP, both.shape[1]
-    price = (stiffness * np.arange(-_LONGEST_JUMP, _LONGEST_JUMP + 1, dtype=np.float32) ** 2)[:, None]
-    padded = np.full(width + 2 * _LONGEST_JUMP, np.inf, np.float32)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, width)
-    inner = padded[_LONGEST_JUMP:-_LONGEST_JUMP]
-    inner[:] = both[0]
-    jumped = np.empty((half - 1, len(price), width), np.float32)
-    for reached, further in zip(jumped, both[1:], strict=True):
-        np.add(windows, price, out=reached)
-        np.minimum.reduce(reached, axis=0, out=inner)
-        np.add(inner, further, out=inner)
-    join = windows[:, :steps] + price
-    meeting = int((join.min(axis=0) + inner[other:]).argmin())
-    ends = (meeting + int(join[:, meeting].argmin()) - _LONGEST_JUMP, meeting)
-    path = np.empty(len(turns), np.intp)
-    for side, end in enumerate(ends):
-        place = end
-        for index in range(half - 1, 0, -1):
-            path[index if side == 0 else len(turns) - 1 - index] = place
-            place += int(jumped[index - 1, :, place + side * other].argmin()) - _LONGEST_JUMP
-        path[-side] = place
+    turns = np.concatenate([cost, cost[: rays // 2]])
+    half, other = len(turns) // 2, steps + _LONGEST_JUMP
+    width = other + steps
+    padded = np.full((half, width + 2 * _LONGEST_JUMP), np.inf, np.float32)
+    # Where a path comes from, by its jump: the same rows moved.
+    moved = [padded[:, first : first + width] for first in range(2 * _LONGEST_JUMP + 1)]
+    sums = moved[_LONGEST_JUMP]
+    sums[:, :steps], sums[:, other:] = turns[:half], turns[: half - 1 : -1]
+    prices = stiffness * np.arange(-_LONGEST_JUMP, _LONGEST_JUMP + 1, dtype=np.float32) ** 2
+    jumped = np.empty((_LONGEST_JUMP, width), np.float32)
+    added = np.repeat(prices[:_LONGEST_JUMP, None], width, axis=1)
+    far, near = jumped
+    for far_up, up, straight, down, far_down, further in zip(*(rows[:-1] for rows in moved), sums[1:], strict=True):
+        # Either way costs the same: the cheaper of the two is taken before the price is added.
+        np.minimum(far_up, far_down, out=far)
+        np.minimum(up, down, out=near)
+        np.add(jumped, added, out=jumped)
+        np.minimum(far, near, out=near)
+        np.minimum(near, straight, out=near)
+        np.add(further, near, out=further)
+    reached = np.empty((len(moved), half, width), np.float32)
+    for rows, price, out in zip(moved, prices, reached, strict=True):
+        np.add(rows, price, out=out)
+    join = reached[:, -1, :steps]
+    meeting = int((join.min(axis=0) + sums[-1, other:]).argmin())
+    ends = (int(join[:, meeting].argmin()) - _LONGEST_JUMP + meeting, meeting)
+    # The first of the cheapest jumps at every place, as `argmin` over them finds it in three times as long.
+    least, jumps = reached[0], np.zeros((half, width), np.uint8)
+    for jump, rows in enumerate(reached[1:], 1):
+        np.maximum(jumps, (rows < least).view(np.uint8) * np.uint8(jump), out=jumps)
+        np.minimum(least, rows, out=least)
+    taken = jumps.tobytes()
+    paths: list[list[int]] = []
+    for end, side in zip(ends, (0, other), strict=True):
+        place, path = end, [end]
+        for row in range((half - 2) * width + side, -1, -width):
+            place += taken[row + place] - _LONGEST_JUMP
+            path.append(place)
+        paths.append(path)
+    path = paths[0][::-1] + paths[1]
     start = rays // 4
-    return np.roll(path[start : start + rays], start)
+    return np.array(path[rays : rays + start] + path[start:rays], np.intp)

@@ -7,13 +7,14 @@ place gains by how far its level, clipped at what most of the region reaches, li
 Rays are drawn in coordinates in which the region is as wide as it is long, so that a long body has a region as well.
 """
 
+import math
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from station.vision.background import Background, quantile, thinned, weighted_median
+from station.vision.background import Background, quantile, quantiles, thinned, weighted_median
 from station.vision.constants import NORMAL_OF_MEDIAN, Constants
 from station.vision.contact import FloatImage, Mask
 from station.vision.contour import Rays, closed_path
@@ -42,6 +43,8 @@ class Movement(NamedTuple):
     """Slightly smoothed, shape (height, width, 3), grey levels."""
     squared: FloatImage
     """Its squared length, shape (height, width)."""
+    length: FloatImage
+    """Its length, shape (height, width), grey levels."""
     weight: FloatImage
     """How surely a place is background, shape (height, width), 0 to 1."""
     share: float
@@ -87,7 +90,9 @@ def movement(half: FloatImage, background: Background, flat_field: FloatImage, c
     """
     change = np.asarray(cv2.GaussianBlur(half, (0, 0), _CHANGE_BLUR_PX), np.float32)
     weight = resized(background.weight, (half.shape[1], half.shape[0]))
-    return Movement(change, length_squared(change), weight, background.share, flat_field, curvature)
+    squared = length_squared(change)
+    length = np.asarray(cv2.sqrt(squared), np.float32)
+    return Movement(change, squared, length, weight, background.share, flat_field, curvature)
 
 
 def flat_field_correction(light: FloatImage, constants: Constants) -> FloatImage:
@@ -130,29 +135,34 @@ def find_region(
     p = constants
     shape = (start.shape[0], start.shape[1])
     mask, share, coherence = start, p.candidate_share, 0.0
+    halved = _halved(moved)
     inner = _inner_hull(start, p.hull_share)
     if floor is not None:
         inner |= floor
+    # A flat centre has not moved; it lies within what has, and costs nothing. Elsewhere no gain is as low as -1.
+    least_gain = inner.astype(np.float32) - 1
     for last in (False, True):
         radius = radius_of(mask)
         # A long body's window goes with its width: the level that a wider one spreads beyond it would count as body.
         window_px = p.region_window * radius * Rays.about(mask).across
-        level, spread = level_of(moved, max(_LEAST_WINDOW_PX, window_px))
-        level *= moved.flat_field
+        seen = level_of(moved, max(_LEAST_WINDOW_PX, window_px))
+        level = seen.levels * moved.flat_field
         # Clipped, so that the rim of a ball or an achene weighs no more than the rest of the contact.
-        cap = max(quantile(level[mask > 0], p.cap_quantile), _LEAST_LEVEL)
+        inside = mask > 0
+        cap, middle = (max(one, _LEAST_LEVEL) for one in quantiles(level[inside], p.cap_quantile, 0.5))
         if last:
-            agreed = _coherence(moved, mask, p.coherence_window * radius)
+            agreed = _coherence(moved, halved, mask, p.coherence_window * radius)
             # With hardly any background the model has bent the body's own slopes, and directions say little.
             coherence = agreed * min(1.0, 2 * moved.share / p.known_share)
             # The more the directions agree, the smoother the body, and the stronger its halo outside the edge. The more
             # achenes or drupelets outshine the body, the further their part of the windowed level reaches beyond it.
-            share = p.share_even + p.share_coherent * coherence + p.share_field * float(mask.mean())
-            prominence = max(_prominence(moved.curvature, level, mask), p.least_prominence)
-            share = float(np.clip(share + p.share_prominent * prominence, p.share_least, p.share_most))
-        gain = np.minimum(level * np.float32(1 / cap), 1) - np.float32(share)
-        # A flat centre has not moved; it lies within what has, and costs nothing.
-        np.maximum(gain, 0, out=gain, where=inner > 0)
+            share = p.share_even + p.share_coherent * coherence + p.share_field * (cv2.countNonZero(mask) / mask.size)
+            # How far elements outshine the body, 1/px.
+            strongest = max(quantile(moved.curvature[inside], _STRONGEST_QUANTILE), _LEAST_LEVEL)
+            prominence = max(math.log(strongest / middle), p.least_prominence)
+            share = min(max(share + p.share_prominent * prominence, p.share_least), p.share_most)
+        gain = _clipped(level, cap) - np.float32(share)
+        np.maximum(gain, least_gain, out=gain)
         if others is not None:
             gain[others > 0] = -share
         if floor is not None:
@@ -165,12 +175,19 @@ def find_region(
             return None
     is_known = moved.share >= p.known_share / 2
     if texture is None:
-        texture = _is_skin(moved, mask, p) if is_known else _is_skin_by_curvature(moved, mask, p)
+        texture = (_is_skin if is_known else _is_skin_by_curvature)(moved, halved, mask, p)
     if texture and not is_known:
         mask, radii = _curved(moved, mask, rays, radii, p)
         if floor is not None:
             mask |= floor
-    return Region(mask, rays, radii, level, spread, coherence, texture)
+    return Region(mask, rays, radii, level, seen.spread(moved), coherence, texture)
+
+
+def _halved(moved: Movement) -> Movement:
+    """What of a movement wide windows need, at half its size."""
+    size = (moved.change.shape[1] // 2, moved.change.shape[0] // 2)
+    change, squared, weight = (resized(one, size) for one in (moved.change, moved.squared, moved.weight))
+    return moved._replace(change=change, squared=squared, weight=weight)
 
 
 def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants: Constants) -> tuple[Mask, _Floats]:
@@ -182,32 +199,31 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
     halo = min(p.halo_over_least * quantile(thinned(moved.curvature), _FLOOR_QUANTILE), p.halo_curvature)
     curvature = np.sqrt(np.maximum(np.square(moved.curvature) - np.float32(halo**2), 0), dtype=np.float32)
     cap = max(quantile(curvature[region > 0], p.curved_quantile), _LEAST_LEVEL)
-    gain = np.minimum(curvature * np.float32(1 / cap), 1) - np.float32(p.curved_share)
+    gain = _clipped(curvature, cap) - np.float32(p.curved_share)
     curved_radii = _most_gained(gain, rays, p.region_span * rays.reach(region), 1, p.path_stiffness)
     curved = _drawn(rays, curved_radii, 1, (region.shape[0], region.shape[1]))
     return (curved, curved_radii) if curved.any() else (region, radii)
 
 
-def _is_skin(moved: Movement, region: Mask, constants: Constants) -> bool:
+def _is_skin(moved: Movement, halved: Movement, region: Mask, constants: Constants) -> bool:
     """Whether the change turns from place to place; the larger the body, the more places there are to disagree."""
     p, radius = constants, radius_of(region)
     smooth = min(p.smooth_small, p.smooth_at_one - p.smooth_per_size * float(np.log(radius)))
-    return _coherence(moved, region, p.coherence_window * radius, p.skin_left_out) < smooth
+    return _coherence(moved, halved, region, p.coherence_window * radius, p.skin_left_out) < smooth
 
 
-def _is_skin_by_curvature(moved: Movement, region: Mask, constants: Constants) -> bool:
+def _is_skin_by_curvature(moved: Movement, halved: Movement, region: Mask, constants: Constants) -> bool:
     """Whether a region is skin where there is hardly any background, so that directions say little.
 
     Skin is what is finer than the body's own slopes, times how much the strongest tenth curves.
     """
     strong = quantile(moved.curvature[region > 0], _STRONG_QUANTILE)
-    return _fine_share(moved.change, region, constants) * strong > constants.fine_on_skin
+    return _fine_share(halved.change, region, constants) * strong > constants.fine_on_skin
 
 
 def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float:
     """How much of a region's squared change is as fine as achenes are: the medians' ratio, or 0 in few pixels."""
-    size = (change.shape[1] // 2, change.shape[0] // 2)
-    change = resized(change, size)
+    size = (change.shape[1], change.shape[0])
     sigmas = (constants.fine_blur / 2, constants.coarse_blur / 2)
     elements, slopes = (np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32) for sigma in sigmas)
     inside = cv2.resize(region, size, interpolation=cv2.INTER_NEAREST) > 0
@@ -226,64 +242,85 @@ def has_moved_widely(moved: Movement, constants: Constants) -> bool:
         moved: from `movement`.
         constants: how much of the frame, and how far.
     """
-    level, _ = level_of(moved, constants.level_window)
-    return quantile(thinned(level), 1 - constants.wide_share) > constants.wide_levels
+    levels = level_of(moved, constants.level_window).levels
+    return quantile(thinned(levels), 1 - constants.wide_share) > constants.wide_levels
 
 
-def level_of(moved: Movement, window_px: float) -> tuple[FloatImage, float]:
-    """The change's root mean square over a window above the background's, and that root's spread in the background.
+class Level(NamedTuple):
+    """How far each place has moved."""
+
+    levels: FloatImage
+    """The change's root mean square over a window above the background's, shape (height, width), grey levels."""
+    roots: FloatImage
+    """The root mean square itself, every few pixels."""
+    background_root: float
+    """The background's."""
+
+    def spread(self, moved: Movement) -> float:
+        """The root's standard deviation in the background, grey levels.
+
+        Args:
+            moved: that the level is of.
+        """
+        return NORMAL_OF_MEDIAN * _in_background(np.abs(self.roots - self.background_root), moved)
+
+
+def level_of(moved: Movement, window_px: float) -> Level:
+    """The change's level in a window.
 
     Args:
         moved: from `movement`.
         window_px: the Gaussian window's standard deviation, px of half the working size.
-
-    Returns:
-        Shape (height, width) and the spread, grey levels.
     """
     mean = blurred(moved.squared, window_px)
-    few, weight = thinned(np.asarray(mean, np.float32)), thinned(moved.weight)
-    seen = moved.share >= _LEAST_BACKGROUND
-    floor = weighted_median(few, weight) if seen else quantile(few, _FLOOR_QUANTILE)
-    scatter = np.abs(np.sqrt(few) - np.sqrt(floor))
-    spread = NORMAL_OF_MEDIAN * (weighted_median(scatter, weight) if seen else quantile(scatter, _FLOOR_QUANTILE))
-    return np.sqrt(np.maximum(mean - np.float32(floor), 0), dtype=np.float32), spread
+    few = thinned(mean)
+    floor = _in_background(few, moved)
+    above = np.maximum(mean - np.float32(floor), 0)
+    return Level(np.sqrt(above, out=above), np.sqrt(few), math.sqrt(floor))
 
 
-def _prominence(curvature: FloatImage, level: FloatImage, region: Mask) -> float:
-    """Logarithm of a region's strongest curvature over its median level: how far elements outshine the body, 1/px."""
-    inside = region > 0
-    strongest = quantile(curvature[inside], _STRONGEST_QUANTILE)
-    return float(np.log(max(strongest, _LEAST_LEVEL) / max(quantile(level[inside], 0.5), _LEAST_LEVEL)))
+def _in_background(few: FloatImage, moved: Movement) -> float:
+    """The median of a thinned field in the background, or nearly its least where there is hardly any."""
+    if moved.share < _LEAST_BACKGROUND:
+        return quantile(few, _FLOOR_QUANTILE)
+    return weighted_median(few, thinned(moved.weight))
 
 
-def _coherence(moved: Movement, region: Mask, window_px: float, left_out: float = 0.0) -> float:
+def _clipped(field: FloatImage, cap: float) -> FloatImage:
+    """A field in units of a cap, at which it is clipped."""
+    shares = field * np.float32(1 / cap)
+    return np.minimum(shares, 1, out=shares)
+
+
+def _coherence(moved: Movement, halved: Movement, region: Mask, window_px: float, left_out: float = 0.0) -> float:
     """Squared mean over mean square of the change in a window, both above the background's: the region's median.
 
     The region's mean change is taken off before: slopes point all ways, so it is light that the model left over. The
     share of the region that has moved least is left out: noise has no direction.
     """
     window_px = max(_CHANGE_BLUR_PX, window_px)
-    change, squared, weight = moved.change, moved.squared, moved.weight
     if window_px > _HALF_FROM_PX:  # a wide window loses nothing at half the size, and takes a quarter of the time
-        size = (change.shape[1] // 2, change.shape[0] // 2)
-        change, squared, window_px = resized(change, size), resized(squared, size), window_px / 2
-        weight = resized(weight, size)
+        moved, window_px = halved, window_px / 2
+        size = (moved.change.shape[1], moved.change.shape[0])
         region = np.asarray(cv2.resize(region, size, interpolation=cv2.INTER_NEAREST), np.uint8)
-    cast = np.array(cv2.mean(change, region)[:3], np.float32)
-    smooth = np.asarray(cv2.GaussianBlur(change, (0, 0), window_px), np.float32)
-    mean_square = np.asarray(cv2.GaussianBlur(squared, (0, 0), window_px), np.float32)
+    smooth = np.asarray(cv2.GaussianBlur(moved.change, (0, 0), window_px), np.float32)
+    mean_square = np.asarray(cv2.GaussianBlur(moved.squared, (0, 0), window_px), np.float32)
     seen = moved.share >= _LEAST_BACKGROUND
     floors = [
-        weighted_median(one, weight) if seen else quantile(thinned(one), _FLOOR_QUANTILE)
+        weighted_median(one, moved.weight) if seen else quantile(thinned(one), _FLOOR_QUANTILE)
         for one in (length_squared(smooth), mean_square)
     ]
+    cast = np.array(cv2.mean(moved.change, region))
+    square = length_squared(np.asarray(cv2.subtract(smooth, cast), np.float32))
+    cast = cast[:3].astype(np.float32)
+    mean_square -= 2 * (smooth.reshape(-1, 3) @ cast).reshape(square.shape)
     inside = region > 0
-    within = smooth[inside]
-    agreed = np.maximum(np.square(within - cast).sum(axis=1) - floors[0], 0)
-    whole = mean_square[inside] - 2 * within @ cast + cast @ cast - floors[1]
-    whole = np.maximum(whole, _LEAST_LEVEL)
-    kept = whole >= quantile(whole, left_out)
-    return quantile(agreed[kept] / whole[kept], 0.5)
+    agreed = np.maximum(square[inside] - floors[0], 0)
+    whole = np.maximum(mean_square[inside] + cast @ cast - floors[1], _LEAST_LEVEL)
+    if left_out:
+        kept = whole >= quantile(whole, left_out)
+        agreed, whole = agreed[kept], whole[kept]
+    return quantile(agreed / whole, 0.5)
 
 
 def _most_gained(gain: FloatImage, rays: Rays, reach: float, every: int, stiffness: float) -> _Floats:

@@ -18,7 +18,6 @@ from station.vision.candidates import Candidates, around, body_candidates, disc,
 from station.vision.changed_area import agreement, agreement_of_growth, changed
 from station.vision.constants import CONSTANTS, Constants
 from station.vision.contact import Contact, FloatImage, Image, Mask, StageSink, contact_from_mask
-from station.vision.contour import change_length
 from station.vision.curvature import curvature, curvature_noise, first_background
 from station.vision.debris import Debris
 from station.vision.outline import Outline, find_outline
@@ -291,7 +290,7 @@ class RobustMethod:
             state.calm *= 1 - resized(state.floor.astype(np.float32), size)
         state.background = self._model.fit(state.quarter, state.calm, None if before is None else before.coefficients)
         if "background" not in self._without:
-            state.difference = state.difference - state.background.levels
+            state.difference -= state.background.levels
         state.difference *= self._unsaturated
 
     def _destripe(self, state: State) -> None:
@@ -476,9 +475,8 @@ class RobustMethod:
     def _outlined(self, state: State, body: Region) -> Outline | None:
         """The outline of a region, or None where the image does not support it."""
         p = self._constants
-        length = change_length(state.difference, p)
-        sure = state.gate > p.sure_gate
-        outline = find_outline(length, body, state.background, self._parameters.edge_stiffness, p, state.floor)
+        sure, stiffness = state.gate > p.sure_gate, self._parameters.edge_stiffness
+        outline = find_outline(state.moved.length, body, state.background, stiffness, p, state.floor)
         smallest_px = self._parameters.smallest_contact_px * outline.inside.size / PRINTED_IMAGE_PX
         if cv2.countNonZero(outline.inside) < smallest_px:
             return None

@@ -120,8 +120,9 @@ def test_what_has_been_in_contact_before_is_in_the_region_though_it_moves_no_mor
 
 
 def test_nothing_stands_out_of_noise_alone(moved):
-    level, spread = level_of(moved(np.zeros((*SHAPE, 3))), 3.0)
-    assert np.median(level) < 2 * spread
+    still = moved(np.zeros((*SHAPE, 3)))
+    level = level_of(still, 3.0)
+    assert np.median(level.levels) < 2 * level.spread(still)
 
 
 def test_weak_light_is_corrected():
