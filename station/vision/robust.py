@@ -457,7 +457,8 @@ class RobustMethod:
             state.confidence *= state.agreed
         if state.weak_at:
             state.confidence *= _WEAK_DOUBT
-        if Flag.REFERENCE_MISMATCH in flags:
+        moved = touched and state.floor is None and self._debris.may_be(state.gate, cv2.countNonZero(state.contact))
+        if Flag.REFERENCE_MISMATCH in flags or (moved and "debris" not in self._without):
             state.confidence = 0.0
         if state.confidence < self._parameters.least_confidence:
             flags.add(Flag.LOW_CONFIDENCE)

@@ -6,10 +6,11 @@ import pytest
 from station.settings.segmentation import RobustParameters
 from station.studies.cohort import member
 from station.twin.digit.press import PressOptions, render_press
-from station.twin.digit.sensor import Condition
+from station.twin.digit.sensor import Condition, DigitSensor
 from station.vision.debris import Debris
 from station.vision.robust import RobustMethod
 from station.vision.working import resized
+from station.vocabulary import Flag
 
 SHAPE = (320, 240)
 
@@ -61,6 +62,28 @@ def test_two_particles_side_by_side_are_no_edge_of_a_beam_of_light():
     assert clean[80, 52] == clean[80, 67] == 0
     beam = np.where(np.abs(np.indices(SHAPE)[1] - 120) < 2, np.float32(45), np.float32(0))[..., None]
     assert Debris(light() + beam * (np.indices(SHAPE)[0] < 160)[..., None]).clean.all()
+
+
+def test_a_contact_is_too_steep_for_its_size_only_where_the_gel_has_debris():
+    dirty, clean = Debris(light() + bump(10, 45).astype(np.float32)), Debris(light())
+    assert dirty.may_be(gate=12.0, area_px=700)
+    assert not dirty.may_be(gate=9.0, area_px=700)
+    assert not dirty.may_be(gate=12.0, area_px=1600)
+    assert not clean.may_be(gate=12.0, area_px=700)
+
+
+def test_debris_that_has_moved_is_hardly_ever_trusted():
+    doubtful: list[bool] = []
+    without_debris: list[bool] = []
+    for seed in range(50_000, 50_010):
+        sensor = DigitSensor(seed, seed % 7)
+        before, after = Condition(dirt=4), Condition(dirt=4, dirt_moved=1 + seed)
+        references = [sensor.frame(None, k / 30, before) for k in range(5)]
+        frame = sensor.frame(None, 1.0, after)
+        for found, without in ((doubtful, frozenset()), (without_debris, frozenset({"debris"}))):
+            contact = RobustMethod(references, RobustParameters(), without=without).measure(frame)
+            found.append(not contact.found or Flag.LOW_CONFIDENCE in contact.flags)
+    assert sum(doubtful) >= 9 > sum(without_debris)
 
 
 @pytest.mark.parametrize(("kind", "first_seed", "closing_mm"), [("blueberry", 1406, 0.4), ("strawberry", 1407, 0.3)])
