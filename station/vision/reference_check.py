@@ -38,7 +38,8 @@ of 14,522 draws of 19 units)."""
 
 _LITTLE_MISSING = 0.4
 """Of `_MOST_MISSING`. Another unit lacks at least this much: 0.42 to 0.97 of the 8 in 100 pairs of the twin that only
-the second way notices, 0.72 and more of the real ones. Below it the second way is spared, as for half of all presses."""
+the second way notices, 0.72 and more of the real ones. Below it that way is spared, as for half of all presses."""
+
 _COARSER = 2
 """How much larger the cells of the second size are."""
 _WIDER_BAND_CELLS = (1.4, 4.0)
