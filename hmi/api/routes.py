@@ -27,6 +27,7 @@ from hmi.api.model import (
     RecipeSummary,
 )
 from hmi.past.past import UnknownInspectionError
+from hmi.past.recipes import RecipeState
 from hmi.web.access import HmiNow
 from hmi.web.roles import Right
 from station.channel.panel import Actor, AlarmList, ListAlarms
@@ -37,7 +38,6 @@ from station.channel.panel_queries import (
     Search,
     StartLot,
 )
-from station.channel.panel_recipe_queries import GetRecipe, ListRecipes, RecipeRow, Recipes, RecipeView
 from station.vocabulary import OutcomeName, Reason
 
 IN_SCHEMA = True
@@ -137,22 +137,17 @@ async def inspection(hmi: HmiNow, _: Reader, sequence: Sequence) -> InspectionDe
 @router.get("/recipes", tags=["recipes"])
 async def recipes(hmi: HmiNow, _: Reader) -> RecipeList:
     """The state of every recipe."""
-    reply = await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
-    return RecipeList(recipes=[RecipeSummary(**_short(row)) for row in reply.rows])
+    return RecipeList(recipes=[RecipeSummary(**_short(state)) for state in (await hmi.past.recipes.read()).states])
 
 
 @router.get("/recipes/{name}", tags=["recipes"], responses=_NOT_FOUND)
 async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeDetails:
     """One recipe, with the values in force."""
-    reply = await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
-    row = next((each for each in reply.rows if each.name == name), None)
-    if row is None:
+    found = next((each for each in (await hmi.past.recipes.read()).states if each.name == name), None)
+    if found is None:
         raise HTTPException(404, f"there is no recipe {name}; /api/v1/recipes lists them")
-    values = None
-    if row.in_force is not None:
-        query = GetRecipe(name=name, revision=row.in_force)
-        values = (await hmi.gateway.request(query, RecipeView, deadline_s=DEADLINE_S)).values
-    return RecipeDetails(**_short(row), values=values)
+    values = found.control.recipe.model_dump(mode="json") if found.control is not None else None
+    return RecipeDetails(**_short(found), values=values)
 
 
 @router.get("/lots", tags=["lots"])
@@ -186,13 +181,13 @@ async def end_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path(
     return LotAnswer.of(await hmi.gateway.request(query, LotView, deadline_s=DEADLINE_S))
 
 
-def _short(row: RecipeRow) -> dict[str, Any]:
+def _short(state: RecipeState) -> dict[str, Any]:
     return {
-        "name": row.name,
-        "title": row.title,
-        "plc_number": row.plc_number,
-        "revision": row.in_force,
-        "waiting": row.waiting,
+        "name": state.name,
+        "title": state.title,
+        "plc_number": state.recipe and state.recipe.plc_number,
+        "revision": state.control and state.control.revision,
+        "waiting": state.submitted and state.submitted.revision,
     }
 
 

@@ -30,7 +30,6 @@ from station.channel.panel_queries import (
     StartExport,
     StartLotReport,
 )
-from station.channel.panel_recipe_queries import ListRecipes, RecipeRow, Recipes
 from station.charts.area_chart import Curve, Limit, Mark
 from station.charts.spark import spark
 from station.messages.reasons import reason_message
@@ -94,7 +93,7 @@ async def search(
     found = InspectionPage(rows=(), below=None)
     if wanted is not None:
         found = await hmi.past.find(wanted, PAGE, below)
-    recipes = await _recipes(hmi)
+    recipes = (await hmi.past.recipes.read()).states
     return show(
         request,
         "history.html.j2",
@@ -148,8 +147,8 @@ async def report(hmi: HmiNow, caller: GenuineCaller, lot: Annotated[str, Form(ma
 async def audit(request: Request, hmi: HmiNow, locale: LocaleNow, action: Words = "", subject: Words = "") -> Response:
     """Show the latest rows of the audit trail, as sentences."""
     found = await hmi.past.audit(100, action, subject)
-    recipes = await _recipes(hmi)
-    fruit = {row.plc_number: row.title for row in recipes if row.plc_number is not None}
+    recipes = (await hmi.past.recipes.read()).states
+    fruit = {each.recipe.plc_number: each.title for each in recipes if each.recipe is not None}
     rows = [(row, sentence(row, fruit, locale)) for row in found]
     return show(request, "history_audit.html.j2", rows=rows, action=action, subject=subject)
 
@@ -244,13 +243,6 @@ async def _neighbours(hmi: Hmi, sequence: int) -> tuple[int | None, int | None]:
     earlier = (await hmi.past.find(Search(), 1, sequence)).rows
     after = min((row.sequence for row in later if row.sequence > sequence), default=None)
     return (earlier[0].sequence if earlier else None), after
-
-
-async def _recipes(hmi: Hmi) -> tuple[RecipeRow, ...]:
-    """Return the recipes; none while the station is away, when fruit have no titles and are found all the same."""
-    if not hmi.gateway.fresh:
-        return ()
-    return (await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)).rows
 
 
 def _steps(reply: InspectionView) -> list[dict[str, Any]]:

@@ -13,6 +13,7 @@ from typing import Self
 import cv2
 
 from hmi.past.pictures import read_image, read_stages
+from hmi.past.recipes import PastRecipes
 from hmi.past.tried import Tried, read_tried
 from station.channel.panel_queries import (
     AuditRowView,
@@ -54,6 +55,7 @@ class Past:
 
     def __init__(self, site: Configuration) -> None:
         self._site, self._folder, self._worker = site, site.home / "records", PanelWorker()
+        self.recipes = PastRecipes(site.home, site.recipes_folder, self._worker)
 
     def __enter__(self) -> Self:
         cv2.setNumThreads(1)  # a page that measures an image must leave the other cores to the cycle

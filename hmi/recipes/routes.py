@@ -11,6 +11,7 @@ from starlette.responses import Response
 
 from hmi.common.charts import area_over_closing
 from hmi.past.past import RecordsError, Tried
+from hmi.past.recipes import PastCurve, RecipeState, changes_of, recipe_of
 from hmi.recipes.form import BadFieldError, changed, formatted, groups, with_changes
 from hmi.recipes.strip import strip
 from hmi.web.access import HmiNow, LocaleNow, caller_of, orders
@@ -22,27 +23,14 @@ from hmi.web.problem import Problem
 from hmi.web.roles import Right
 from hmi.web.sessions import Caller
 from hmi.web.translation import Locale
+from station.channel.line import Noted
 from station.channel.messages import RefusedError
 from station.channel.panel_queries import JobView
-from station.channel.panel_recipe_queries import (
+from station.channel.panel_recipe_orders import (
     LARGEST_TEXT,
     ApproveRecipe,
-    Change,
-    Changes,
-    CompareRecipe,
-    ExportRecipe,
-    GetPastCurves,
-    GetRecipe,
-    GetRecipeHistory,
+    ImportedRecipe,
     ImportRecipe,
-    ListRecipes,
-    PastCurve,
-    PastCurves,
-    RecipeHistory,
-    RecipeRow,
-    Recipes,
-    RecipeText,
-    RecipeView,
     RejectRecipe,
     RevertRecipe,
     SaveDraft,
@@ -52,6 +40,7 @@ from station.channel.panel_recipe_queries import (
 from station.charts.area_chart import Curve, Kind, Limit
 from station.messages.message import Message
 from station.settings.recipe_model import Recipe
+from station.settings.recipe_versions import content_sha256
 
 router = APIRouter(prefix="/recipes")
 ENTRY = Entry("recipes", "/recipes")
@@ -72,42 +61,37 @@ Approver = Annotated[Caller, Depends(orders(Right.APPROVE_RECIPES))]
 @router.get("")
 async def recipes(request: Request, hmi: HmiNow) -> Response:
     """Show the state of all recipes."""
-    return show(
-        request, "recipes.html.j2", reply=await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
-    )
+    return show(request, "recipes.html.j2", reply=await hmi.past.recipes.read())
 
 
 @router.get("/{name}")
 async def recipe(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
     """Show one recipe: the revision in force, the draft, the differences, the possible actions."""
-    standing = await _row(hmi, name)
-    changes: tuple[Change, ...] = ()
-    if standing.in_force is not None and (standing.waiting is not None or standing.file_state == "draft"):
-        query = CompareRecipe(name=name, new=standing.waiting)
-        changes = (await hmi.gateway.request(query, Changes, deadline_s=DEADLINE_S)).changes
-    values = await _values(hmi, name, standing)
-    drawn = None if values is None else await _drawn(hmi, locale, name, values)
-    return show(request, "recipe.html.j2", row=standing, changes=changes, drawn=drawn, tab="standing")
+    state = await _state(hmi, name)
+    shown = recipe_of(state.submitted) if state.submitted else state.control and state.control.recipe
+    new = shown if state.submitted else state.file and state.file.recipe
+    changes = changes_of(state.control.recipe, new) if state.control and new else ()
+    drawn = None if shown is None else await _drawn(hmi, locale, shown, shown.model_dump(mode="json"))
+    return show(request, "recipe.html.j2", row=state, changes=changes, drawn=drawn, tab="standing")
 
 
 @router.get("/{name}/edit")
 async def edit(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
     """Show the form."""
-    reply = await hmi.gateway.request(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
-    return await _form(request, hmi, locale, reply, {}, "")
+    return await _form(request, hmi, locale, name, {}, "")
 
 
 @router.get("/{name}/chart")
 async def chart(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
     """Render the chart with the typed limits; a field without a valid number keeps its stored value."""
-    reply = await hmi.gateway.request(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
-    typed: dict[str, Any] = {}
+    stored = (await _state(hmi, name)).valid_file.recipe
+    values, typed = stored.model_dump(mode="json"), dict[str, Any]()
     for path, text in _typed(request.query_params).items():
         try:
-            typed |= changed(reply.values, {path: text})
+            typed |= changed(values, {path: text})
         except BadFieldError:
             continue
-    drawn = await _drawn(hmi, locale, name, with_changes(reply.values, typed))
+    drawn = await _drawn(hmi, locale, stored, with_changes(values, typed))
     html = hmi.renderer.render("recipe_chart.html.j2", locale, {"drawn": drawn})
     return Response(html, media_type="text/html")
 
@@ -119,21 +103,21 @@ async def save(
     """Save the typed values as a draft; errors are shown beside the form, which keeps the typed text."""
     form = await request.form()
     texts = {key: value for key, value in form.items() if isinstance(value, str)}
-    reply = await hmi.gateway.request(GetRecipe(name=name), RecipeView, deadline_s=DEADLINE_S)
+    values = (await _state(hmi, name)).valid_file.recipe.model_dump(mode="json")
     typed = _typed(texts)
     try:
-        changes = changed(reply.values, typed)
+        changes = changed(values, typed)
     except BadFieldError as error:
         why = locale.text("recipes.bad_field", field=_title(locale, error.field.key, error.field.title),
                            expected=locale.sentence(error.field.expected))  # fmt: skip
-        return await _form(request, hmi, locale, reply, typed, why, reason)
+        return await _form(request, hmi, locale, name, typed, why, reason)
     if not changes:
-        return await _form(request, hmi, locale, reply, typed, locale.text("recipes.nothing_changed"), reason)
+        return await _form(request, hmi, locale, name, typed, locale.text("recipes.nothing_changed"), reason)
     try:
         query = SaveDraft(name=name, values=changes, base=texts.get("base", ""), reason=reason, actor=actor_of(caller))
-        await hmi.gateway.request(query, RecipeRow, deadline_s=DEADLINE_S)
+        await hmi.gateway.request(query, Noted, deadline_s=DEADLINE_S)
     except RefusedError as error:
-        return await _form(request, hmi, locale, reply, typed, error.message, reason)
+        return await _form(request, hmi, locale, name, typed, error.message, reason)
     return go_to(f"/recipes/{name}")
 
 
@@ -176,9 +160,8 @@ async def history(
     request: Request, hmi: HmiNow, name: Name, below: Annotated[int | None, Query(ge=1, le=2**31)] = None
 ) -> Response:
     """Show the revisions: author, approver, dates, differences."""
-    query = GetRecipeHistory(name=name, below=below)
-    reply = await hmi.gateway.request(query, RecipeHistory, deadline_s=DEADLINE_S)
-    return show(request, "recipe_history.html.j2", row=await _row(hmi, name), reply=reply, tab="history")
+    row, reply = await _state(hmi, name), await hmi.past.recipes.history(name, below)
+    return show(request, "recipe_history.html.j2", row=row, reply=reply, tab="history")
 
 
 @router.get("/{name}/text")
@@ -186,16 +169,17 @@ async def text(
     request: Request, hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(ge=1, le=2**31)] = None
 ) -> Response:
     """Show the file's text, with its comments."""
-    reply = await hmi.gateway.request(GetRecipe(name=name, revision=revision), RecipeView, deadline_s=DEADLINE_S)
-    return show(request, "recipe_text.html.j2", row=reply.row, text=reply.text, revision=revision, tab="text")
+    row = await _state(hmi, name)
+    text = row.valid_file.text if revision is None else (await hmi.past.recipes.revision(name, revision)).text
+    return show(request, "recipe_text.html.j2", row=row, text=text, revision=revision, tab="text")
 
 
 @router.get("/{name}/export")
 async def export(hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(ge=1, le=2**31)] = None) -> Response:
     """Send the file, to be edited elsewhere and imported again."""
-    reply = await hmi.gateway.request(ExportRecipe(name=name, revision=revision), RecipeText, deadline_s=DEADLINE_S)
+    text = await hmi.past.recipes.export_text(name, revision)
     headers = {"content-disposition": f'attachment; filename="{name}.yaml"'}
-    return Response(reply.text, media_type="application/yaml", headers=headers)
+    return Response(text, media_type="application/yaml", headers=headers)
 
 
 @router.post("/import")
@@ -208,15 +192,9 @@ async def import_file(hmi: HmiNow, caller: Editor, reason: Reason, file: Annotat
         raise Problem(400, "problem.bad_form") from None
     if not text or len(text) > LARGEST_TEXT:
         raise Problem(400, "problem.bad_form")
-    actor = actor_of(caller)
-    row = await hmi.gateway.request(
-        ImportRecipe(text=text, reason=reason, actor=actor), RecipeRow, deadline_s=DEADLINE_S
-    )
-    if row.file_state == "draft":
-        await hmi.gateway.request(
-            SubmitRecipe(name=row.name, reason=reason, actor=actor), RecipeRow, deadline_s=DEADLINE_S
-        )
-    return go_to(f"/recipes/{row.name}")
+    order = ImportRecipe(text=text, reason=reason, actor=actor_of(caller))
+    imported = await hmi.gateway.request(order, ImportedRecipe, deadline_s=DEADLINE_S)
+    return go_to(f"/recipes/{imported.name}")
 
 
 @router.post("/{name}/whatif")
@@ -231,7 +209,7 @@ async def whatif(
 
 
 async def _order(hmi: Hmi, order: SubmitRecipe | ApproveRecipe | RejectRecipe | RevertRecipe) -> Response:
-    await hmi.gateway.request(order, RecipeRow, deadline_s=DEADLINE_S)
+    await hmi.gateway.request(order, Noted, deadline_s=DEADLINE_S)
     return go_to(f"/recipes/{order.name}")
 
 
@@ -239,19 +217,22 @@ async def _form(
     request: Request,
     hmi: Hmi,
     locale: Locale,
-    reply: RecipeView,
+    name: str,
     typed: Mapping[str, str],
     wrong: str | Message,
     reason: str = "",
 ) -> Response:
-    made, sign = groups(reply.values), locale.decimal_sign
+    known, row = await hmi.past.recipes.read(), await _state(hmi, name)
+    stored = row.valid_file.recipe
+    values = stored.model_dump(mode="json")
+    made, sign = groups(values), locale.decimal_sign
     texts = {field.path: typed.get(field.path, formatted(field, sign)) for group in made for field in group.fields}
-    caller, known = caller_of(request), await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
     return show(
         request,
         "recipe_edit.html.j2",
         status=400 if wrong else 200,
-        row=reply.row,
+        row=row,
+        base=content_sha256(stored),
         often=[each for each in made if _OFTEN.fullmatch(each.path)],
         rare=[each for each in made if not _OFTEN.fullmatch(each.path)],
         texts=texts,
@@ -259,10 +240,10 @@ async def _form(
         slides=_SLIDES.fullmatch,
         wrong=wrong,
         reason=reason,
-        drawn=await _drawn(hmi, locale, reply.row.name, reply.values),
+        drawn=await _drawn(hmi, locale, stored, values),
         title=lambda each: _title(locale, each.key, each.title),
         reply=known,
-        editable=known.editable and caller.may(Right.EDIT_RECIPES),
+        editable=known.editable and caller_of(request).may(Right.EDIT_RECIPES),
         tab="edit",
     )
 
@@ -275,35 +256,22 @@ def _typed(texts: Mapping[str, str]) -> dict[str, str]:
     return {key.removeprefix(_PREFIX): value for key, value in texts.items() if key.startswith(_PREFIX)}
 
 
-async def _row(hmi: Hmi, name: str) -> RecipeRow:
-    reply = await hmi.gateway.request(ListRecipes(), Recipes, deadline_s=DEADLINE_S)
-    found = next((row for row in reply.rows if row.name == name), None)
+async def _state(hmi: Hmi, name: str) -> RecipeState:
+    found = next((each for each in (await hmi.past.recipes.read()).states if each.name == name), None)
     if found is None:
         raise Problem(404, "problem.not_found")
     return found
 
 
-async def _values(hmi: Hmi, name: str, row: RecipeRow) -> dict[str, Any] | None:
-    """Return the values of the pending draft, else those in force; None if neither can be read."""
-    revision = row.waiting or row.in_force
-    if revision is None:
-        return None
-    query = GetRecipe(name=name, revision=revision)
-    return (await hmi.gateway.request(query, RecipeView, deadline_s=DEADLINE_S)).values
-
-
-async def _drawn(hmi: Hmi, locale: Locale, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the limits on past curves; an empty result before the first inspection."""
+async def _drawn(hmi: Hmi, locale: Locale, recipe: Recipe, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the limits among the values, on past curves of the recipe; an empty result before the first inspection."""
     try:
-        past = (await hmi.gateway.request(GetPastCurves(name=name), PastCurves, deadline_s=DEADLINE_S)).curves
-    except RefusedError:  # there is no good file, or there are no records yet
+        past = await hmi.past.recipes.curves(recipe)
+    except RecordsError:  # there are none yet
         past = ()
     damage, early = values["damage"], values["early_stop"]
     limits = [Limit(each["closing_mm"], each["area_mm2"], each["least_area_mm2"]) for each in damage["area"]]
-    curves = [
-        Curve(_kind(each), list(zip(each.closings_mm, each.areas_mm2, strict=True)))
-        for each in sorted(past, key=lambda each: each.outcome == "FAIL")
-    ]
+    curves = [Curve(_kind(each), each.points) for each in sorted(past, key=lambda each: each.outcome == "FAIL")]
     width, robust = values["expected_width"], values["segmentation"]["robust"]
     failed = sum(each.outcome == "FAIL" for each in past)
     label = locale.text("chart.recipe_label", n=len(past), failed=failed)
@@ -340,5 +308,4 @@ async def _tried(hmi: Hmi, values: Mapping[str, Any]) -> Tried | Literal["invali
 
 
 def _kind(curve: PastCurve) -> Kind:
-    kinds: dict[str, Kind] = {"PASS": "pass", "FAIL": "fail"}
-    return kinds.get(curve.outcome, "none")
+    return "pass" if curve.outcome == "PASS" else "fail"

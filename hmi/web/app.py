@@ -31,6 +31,7 @@ from hmi.web.streams import stream_places
 from hmi.web.user_store import UserStore
 from station.channel.messages import ChannelError, DeadlineError
 from station.channel.panel_live import PersonNoted
+from station.errors import BadInputError, StationError
 from station.messages.message import Message
 from station.settings.configuration import Configuration
 from station.settings.hmi import panel_endpoint
@@ -99,6 +100,7 @@ def make_app(hmi: Hmi) -> SecurityMiddleware:
             ChannelError: _away,
             RecordsError: _unread,
             PanelBusyError: _unread,
+            BadInputError: _unread,
             Exception: _broken,
         },
     )
@@ -159,9 +161,10 @@ async def _away(request: Request, error: Exception) -> Response:
 
 
 async def _unread(request: Request, error: Exception) -> Response:
-    """Answer that the records do not have it, or cannot be read."""
-    assert isinstance(error, RecordsError | PanelBusyError)  # noqa: S101 (what it is registered for)
-    return _problem_answer(request, 409, locale_of(request).text("problem.records"), error.message)
+    """Answer that the records or recipes do not have it, or cannot be read."""
+    assert isinstance(error, StationError)  # noqa: S101 (what it is registered for)
+    key = "problem.refused" if isinstance(error, BadInputError) else "problem.records"
+    return _problem_answer(request, 409, locale_of(request).text(key), error.message)
 
 
 async def _broken(request: Request, _: Exception) -> Response:

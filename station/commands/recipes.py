@@ -93,7 +93,7 @@ def list_all(config: Path | None) -> None:
 def show(name: str, revision: int | None, config: Path | None) -> None:
     """Show a recipe's file, or the text of one of its revisions, unchanged."""
     store = _store(config)
-    click.echo(store.valid_file(name).text if revision is None else store.revision(name, revision).text, nl=False)
+    click.echo(store.state(name).valid_file.text if revision is None else store.revision(name, revision).text, nl=False)
 
 
 @recipes.command()
@@ -124,7 +124,7 @@ def diff(name: str, old: int | None, new: int | None, config: Path | None) -> No
         before = standing.control.recipe
     else:
         raise BadInputError(f"recipe {name}: none of its revisions is approved; name one with --from")
-    after = store.valid_file(name).recipe if new is None else store.revision(name, new).recipe
+    after = store.state(name).valid_file.recipe if new is None else store.revision(name, new).recipe
     for difference in differences(before, after):
         click.echo(str(difference))
 
@@ -206,7 +206,7 @@ def revert(name: str, revision: int | None, who: str, role: str, reason: str, co
 @_config
 def export_one(name: str, revision: int | None, out: Path | None, config: Path | None) -> None:
     """Write a recipe with a first line that names its version, to edit it elsewhere and import it again."""
-    text = _editor(config).export_text(name, revision)
+    text = _store(config).export_text(name, revision)
     if out is None:
         click.echo(text, nl=False)
         return

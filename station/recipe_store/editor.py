@@ -3,7 +3,6 @@
 Every change makes an unapproved draft at most; the revision in force does not change until a draft is approved.
 """
 
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ from station.messages import recipes as messages
 from station.recipe_store.difference import described_differences
 from station.recipe_store.files import locked, read_folder, write_back
 from station.recipe_store.history import Person
+from station.recipe_store.reader import BASE
 from station.recipe_store.recipe_state import RecipeState, ValidFile
 from station.recipe_store.revision import ConflictError, RecipeStoreError, Status
 from station.recipe_store.store import RecipeStore
@@ -25,7 +25,6 @@ from station.settings.recipe_model import Recipe
 from station.settings.recipe_text import upgraded_text, with_values
 from station.settings.recipe_versions import content_sha256, parse_recipe
 
-_BASE = re.compile(r"^# base: sha256 ([0-9a-f]{64})\n", re.MULTILINE)
 _SHORTEST_BASE = 8
 
 
@@ -72,9 +71,9 @@ class RecipeEditor:
             RecipeStoreError: the file cannot be written.
         """
         recipe = parse_recipe(text, "import.yaml")
-        named = _BASE.search(text)
+        named = BASE.search(text)
         base = base or (named[1] if named else "")
-        body = _BASE.sub("", text, count=1)
+        body = BASE.sub("", text, count=1)
         with locked(self._home):
             files = {file.recipe.name: file for file in read_folder(self._sites()).found}
             file = files.get(recipe.name)
@@ -89,26 +88,6 @@ class RecipeEditor:
                 self._check_base(file, base)
                 self._put(file, body, recipe, "recipe.imported", person)
         return self._store.state(recipe.name)
-
-    def export_text(self, name: str, revision: int | None = None) -> str:
-        """Return a recipe's file; its first line names the version, so that `import_text` notices later changes.
-
-        Args:
-            revision: None for the present file.
-
-        Raises:
-            BadInputError: there is none.
-        """
-        standing = self._store.state(name)
-        now = standing.file
-        if revision is not None:
-            text = self._store.revision(name, revision).text
-        elif now is not None:
-            text = now.text
-        else:
-            raise BadInputError(messages.NO_GOOD_FILE(recipe=name))
-        base = "" if now is None else f"# base: sha256 {content_sha256(now.recipe)}\n"
-        return base + _BASE.sub("", text, count=1)
 
     def revert(self, name: str, person: Person, revision: int | None = None) -> RecipeState:
         """Put a revision's text back into the recipe's file; the present text is stored as a backup.
@@ -154,7 +133,7 @@ class RecipeEditor:
     def _editing(self, name: str) -> Iterator[ValidFile]:
         with locked(self._home):
             self._sites()
-            yield self._store.valid_file(name)
+            yield self._store.state(name).valid_file
 
     def _check_base(self, file: ValidFile, base: str) -> None:
         """Check that the file is the version that the editor has seen."""

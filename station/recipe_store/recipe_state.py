@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
+from station.errors import BadInputError
 from station.messages import recipes as messages
 from station.messages.message import Message, message_of
 from station.recipe_store.difference import described_differences
@@ -55,6 +56,28 @@ class RecipeState:
     """The draft that waits for approval, whatever the file's state."""
     note: Message | None
     """Information or instruction for a person; None if the file is the approved revision."""
+
+    @property
+    def recipe(self) -> Recipe | None:
+        """Return the recipe in force, or else the file's; None if nothing good of it is known."""
+        known = self.control or self.file
+        return known.recipe if known else None
+
+    @property
+    def title(self) -> str:
+        """Return its title, or else its name."""
+        return self.recipe.title if self.recipe else self.name
+
+    @property
+    def valid_file(self) -> ValidFile:
+        """Return its file.
+
+        Raises:
+            BadInputError: there is none, or it is invalid.
+        """
+        if self.file is None:
+            raise BadInputError(self.note or messages.NO_GOOD_FILE(recipe=self.name))
+        return self.file
 
 
 def recipe_states(

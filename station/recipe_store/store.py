@@ -1,82 +1,29 @@
-"""Recipe store of a station, for the command line, the service and the panel. Every method blocks."""
+"""Recipe store of a station, for the command line and the service. Every method blocks."""
 
-import contextlib
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from importlib.metadata import version
-from pathlib import Path
 
 from sqlalchemy import Connection
 
 from station.errors import BadInputError
 from station.messages import recipes as messages
-from station.messages.message import Message
-from station.recipe_store.files import Folder, locked, read_folder
+from station.recipe_store.files import locked, read_folder
 from station.recipe_store.history import Person, approve, read_revisions, retire, store_approved, submit
-from station.recipe_store.recipe_state import RecipeState, ValidFile, recipe_states
+from station.recipe_store.reader import RecipeReader
+from station.recipe_store.recipe_state import ValidFile
 from station.recipe_store.revision import Origin, RecipeStoreError, Revision, Status
 from station.records.audit import AuditEntry, append_audit
-from station.records.database import FILE_NAME, reading, records_folder
+from station.records.database import FILE_NAME, reading
 from station.records.direct_transaction import direct_transaction
-from station.records.errors import RecordsError
-from station.settings.problems import SettingsError, shortened
-from station.settings.recipe import approved_by_distribution, shipped_folder
+from station.settings.recipe import approved_by_distribution
 from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import content_sha256
 
 BEGAN = "recipe.history_began"
 
 
-class RecipeStore:
-    """Recipes of one station: the files that people edit, and the history of approved revisions.
-
-    Args:
-        folder: the site's recipe files; None for the shipped ones, which cannot be edited in place.
-    """
-
-    def __init__(self, home: Path, folder: Path | None) -> None:
-        self._home, self._folder, self._records = home, folder, records_folder(home)
-
-    def read(self) -> tuple[tuple[RecipeState, ...], tuple[Message, ...]]:
-        """Return the state of each recipe, and the errors of the files and their folder.
-
-        Raises:
-            RecordsError: the history cannot be read.
-        """
-        try:
-            folder = read_folder(self._folder)
-        except SettingsError as error:
-            folder = Folder((), {"": list(error.problems)}, error.problems)
-        problems = tuple(each.message for each in folder.problems)
-        return recipe_states(folder.found, folder.broken, self.history()), problems
-
-    def signature(self) -> Hashable:
-        """Return a value that differs whenever a file or the history has changed."""
-        folder = self._folder or shipped_folder()
-        files = []
-        with contextlib.suppress(OSError):
-            for path in sorted(folder.iterdir()):
-                with contextlib.suppress(OSError):
-                    stat = path.stat()
-                    files.append((path.name, stat.st_mtime_ns, stat.st_size, stat.st_ino))
-        try:
-            history = [(each.name, each.revision, each.status) for each in self.history()]
-        except RecordsError as error:
-            return tuple(files), str(error)
-        return tuple(files), tuple(history)
-
-    def history(self, name: str = "") -> list[Revision]:
-        """Return the revisions, oldest first; none before the history began.
-
-        Args:
-            name: of one recipe; all if empty.
-
-        Raises:
-            RecordsError: they cannot be read.
-        """
-        if not (self._records / FILE_NAME).exists():
-            return []
-        with reading(self._records) as connection:
-            return read_revisions(connection, name)
+class RecipeStore(RecipeReader):
+    """Recipes of one station, with what changes their history."""
 
     def begin(self, last_good: Mapping[str, Recipe]) -> None:
         """Store the revisions that need no person's approval; call it at each start.
@@ -111,7 +58,7 @@ class RecipeStore:
             RecipeStoreError: it is approved already, or another person's draft waits.
         """
         with locked(self._home):
-            file = self.valid_file(name)
+            file = self.state(name).valid_file
             self._started()
             with direct_transaction(self._records) as connection:
                 return submit(connection, file.text, file.recipe, person)
@@ -159,45 +106,6 @@ class RecipeStore:
                 wanted = approved[0]
             with direct_transaction(self._records) as connection:
                 return retire(connection, wanted, person)
-
-    def state(self, name: str) -> RecipeState:
-        """Return the state of one recipe.
-
-        Raises:
-            BadInputError: there is none of this name.
-        """
-        every, _ = self.read()
-        for standing in every:
-            if standing.name == name:
-                return standing
-        known = ", ".join(standing.name for standing in every)
-        raise BadInputError(messages.UNKNOWN(recipe=shortened(name), known=known))
-
-    def revision(self, name: str, revision: int) -> Revision:
-        """Return one revision.
-
-        Raises:
-            BadInputError: there is none.
-        """
-        history = self.history(name)
-        for each in history:
-            if each.revision == revision:
-                return each
-        known = ", ".join(str(each.revision) for each in history)
-        if not known:
-            raise BadInputError(messages.NO_REVISION(recipe=shortened(name), revision=revision))
-        raise BadInputError(messages.UNKNOWN_REVISION(recipe=shortened(name), revision=revision, known=known))
-
-    def valid_file(self, name: str) -> ValidFile:
-        """Return a recipe's valid file.
-
-        Raises:
-            BadInputError: there is none, or it is invalid.
-        """
-        standing = self.state(name)
-        if standing.file is None:
-            raise BadInputError(standing.note or messages.NO_GOOD_FILE(recipe=name))
-        return standing.file
 
     def _to_ship(self, found: list[ValidFile], history: list[Revision]) -> list[ValidFile]:
         """Return the files that are identical to the shipped ones, if no person has decided otherwise."""

@@ -60,20 +60,27 @@ class StoredPress:
         return self.press if self.first is None else together([self.first, self.press])
 
 
-def sequences(connection: Connection, name: str, lots: Sequence[str], last: int | None) -> list[int]:
+def sequences(
+    connection: Connection,
+    name: str,
+    lots: Sequence[str],
+    last: int | None,
+    judged: Sequence[OutcomeName] = ("PASS", "FAIL", "NO_RESULT"),
+) -> list[int]:
     """List the judged inspections of a recipe, in order.
 
     Args:
         lots: their names; all if empty.
         last: at most so many, the latest; None for all.
+        judged: with these outcomes.
     """
     marks = ", ".join("?" * len(lots))
     chosen = f"AND i.lot IN ({marks})" if lots else ""
     query = (
         "SELECT i.sequence FROM inspections i JOIN recipe_snapshots r ON r.sha256 = i.recipe_sha256 "  # noqa: S608 (marks)
-        f"WHERE r.name = ? AND i.judged IS NOT NULL {chosen} ORDER BY i.sequence DESC LIMIT ?"
+        f"WHERE r.name = ? AND i.judged IN ({', '.join('?' * len(judged))}) {chosen} ORDER BY i.sequence DESC LIMIT ?"
     )
-    found = connection.exec_driver_sql(query, (name, *lots, -1 if last is None else last))
+    found = connection.exec_driver_sql(query, (name, *judged, *lots, -1 if last is None else last))
     return [row[0] for row in found][::-1]
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from hmi.web.roles import Role
+from station.recipe_store.store import RecipeStore
 from station.records.audit import AuditEntry
 from station.records.lots import start_lot
 from station.records.model import InspectionRecord, RecipeSnapshot, Trigger
@@ -51,6 +52,28 @@ def test_history_lots_and_audit_trail_are_there_while_the_station_is_away(pages,
         whole = json.loads(pages("GET", f"/api/v1/inspections/{fruit}")[2])
         assert (whole["outcome"], whole["lot"]) == ("FAIL", "A-17")
         assert json.loads(pages("GET", "/api/v1/lots/A-17")[2])["grower"] == "Meadow Farm"
+
+
+def test_recipes_their_history_and_past_curves_are_there_while_the_station_is_away(pages, fruit, tmp_path):
+    RecipeStore(tmp_path, None).begin({})
+    with pages.context.past:
+        log_in(pages, "Ana", Role.ADMIN)
+        status, _, body = pages("GET", "/recipes")
+        assert (status, b"Revision 1 in force" in body) == (200, True)
+        status, _, body = pages("GET", "/recipes/strawberry")
+        assert (status, b"No difference from the recipe in force" in body) == (200, True)
+        assert b"1 rejected" in body, "the fruit's curve is drawn"
+        status, _, body = pages("GET", "/recipes/strawberry/history")
+        assert (status, b"Shipped by" in body) == (200, True)
+        status, _, body = pages("GET", "/recipes/strawberry/text?revision=1")
+        assert (status, b"plc_number" in body) == (200, True)
+        assert b"# base: sha256" in pages("GET", "/recipes/strawberry/export")[2]
+        assert pages("GET", "/recipes/strawberry/edit")[0] == 200
+        assert pages("GET", "/recipes/banana/edit")[0] == 404
+        status, _, body = pages("GET", "/recipes/strawberry/text?revision=7")
+        assert (status, b"7" in body) == (409, True)
+        whole = json.loads(pages("GET", "/api/v1/recipes/strawberry")[2])
+        assert (whole["revision"], whole["values"]["name"]) == (1, "strawberry")
 
 
 def test_a_fruit_that_there_is_not_is_said(pages, fruit):

@@ -11,12 +11,11 @@ from typing import Any
 import psutil
 import pytest
 
+from hmi.past.recipes import PastRecipes, RecipeList
 from station.channel.panel_queries import JobView
-from station.channel.panel_recipe_queries import ListRecipes, Recipes
 from station.channel.worker import MOST_WAITING as MOST_QUESTIONS
 from station.channel.worker import PanelBusyError, PanelWorker
 from station.runtime.rpc.jobs import MOST_WAITING, JobError, PanelJobs
-from station.runtime.rpc.recipes import PanelRecipes
 from station.settings.recipe import load_recipes
 
 PATIENCE_S = 60.0
@@ -114,17 +113,17 @@ def test_the_worker_refuses_more_than_it_can_hold() -> None:
 
 
 def test_recipes_shipped_are_not_edited_and_it_is_said_where_they_lie(tmp_path: Path) -> None:
-    async def told(folder: Path | None) -> Recipes:
+    async def told(folder: Path | None) -> RecipeList:
         worker = PanelWorker()
         try:
-            return await PanelRecipes(tmp_path, folder, worker, PanelJobs(tmp_path)).recipes(ListRecipes())
+            return await PastRecipes(tmp_path, folder, worker).read()
         finally:
             worker.close()
 
     shipped = asyncio.run(told(None))
     assert not shipped.editable
-    assert set(load_recipes(Path(shipped.folder))) == {row.name for row in shipped.rows} == set(load_recipes())
+    assert set(load_recipes(shipped.folder)) == {state.name for state in shipped.states} == set(load_recipes())
     own = tmp_path / "recipes"
-    assert shipped.own_folder == str(own)
+    assert shipped.own_folder == own
     own.mkdir()
     assert asyncio.run(told(own)).editable

@@ -1,0 +1,96 @@
+"""Messages of the recipes page: a person's changes."""
+
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+
+from station.channel.messages import ChannelMessage
+from station.channel.panel import Actor
+from station.channel.panel_queries import Why
+
+LARGEST_TEXT = 100_000
+"""Letters of a recipe's file."""
+
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
+Revision = Annotated[int, Field(ge=1, le=2**31)]
+Scalar = bool | int | float | str | None
+
+
+class SaveDraft(ChannelMessage):
+    """Change values in a recipe's file, with its comments, and record it as a draft. Answered with `Noted`.
+
+    Refused as a whole if the recipe would be invalid, or has changed since the author read it.
+    """
+
+    purpose: ClassVar[str] = "to save a draft"
+    name: Name
+    values: dict[Annotated[str, Field(max_length=100)], Scalar | list[float]] = Field(min_length=1, max_length=200)
+    """New values by their dotted paths, as `damage.area[0].area_mm2`."""
+    base: str = Field(pattern=r"^[0-9a-f]{64}$")
+    """The version that the author read."""
+    reason: Why
+    actor: Actor
+
+
+class SubmitRecipe(ChannelMessage):
+    """Record a recipe's file as it is as a draft. Answered with `Noted`."""
+
+    purpose: ClassVar[str] = "to submit a recipe"
+    name: Name
+    reason: Why
+    actor: Actor
+
+
+class ApproveRecipe(ChannelMessage):
+    """Put a draft in force for the next lot; its author cannot. Answered with `Noted`."""
+
+    purpose: ClassVar[str] = "to approve a recipe"
+    name: Name
+    revision: Revision
+    reason: Why
+    actor: Actor
+
+
+class RejectRecipe(ChannelMessage):
+    """Retire a draft: it is not put in force. Answered with `Noted`."""
+
+    purpose: ClassVar[str] = "to reject a draft"
+    name: Name
+    revision: Revision
+    reason: Why
+    actor: Actor
+
+
+class RevertRecipe(ChannelMessage):
+    """Put a revision's text back into the recipe's file. Answered with `Noted`."""
+
+    purpose: ClassVar[str] = "to put a recipe back"
+    name: Name
+    revision: Revision | None = None
+    """None for the approved one."""
+    reason: Why
+    actor: Actor
+
+
+class ImportRecipe(ChannelMessage):
+    """Replace a recipe's file by a whole recipe, and record it as a draft. Answered with `ImportedRecipe`."""
+
+    purpose: ClassVar[str] = "to import a recipe"
+    text: str = Field(min_length=1, max_length=LARGEST_TEXT)
+    reason: Why
+    actor: Actor
+
+
+class ImportedRecipe(ChannelMessage):
+    """An imported recipe."""
+
+    name: str
+
+
+class StartWhatIf(ChannelMessage):
+    """Judge the last inspections again by the recipe's file as it is, as a job."""
+
+    purpose: ClassVar[str] = "what a draft would have done"
+    name: Name
+    last: int = Field(default=500, ge=1, le=100_000)
+    actor: Actor
