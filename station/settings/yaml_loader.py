@@ -31,7 +31,6 @@ _ALIKE = {
 }
 """Words of each kind of PyYAML's that mean the same in both versions."""
 _NUMBER_OF_1_2 = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|0o[0-7]+")
-_BREAK_OF_1_1 = re.compile("[\x85\u2028\u2029]")
 _HALF_CHARACTER = re.compile("[\ud800-\udfff]")
 
 
@@ -77,38 +76,37 @@ def parse_document(content: bytes, source: str) -> Document:
     try:
         reader = _Reader(content.decode("utf-8-sig"))
         node = reader.get_single_node()
-        value = None if node is None else reader.plain(node, ())
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         line, expected = _refusal(error, content.decode("utf-8-sig", "replace"))
-        return Document(source, None, {}, (_problem(source, line, expected),), frozenset({()}))
-    problems = tuple(_problem(source, line, expected, path) for path, line, expected in reader.found)
+        return Document(source, None, {}, (_problem(source, (), line, expected),), frozenset({()}))
+    value = None if node is None else reader.plain(node, ())
+    problems = tuple(_problem(source, *each) for each in reader.found)
     return Document(source, value, reader.lines, problems, frozenset(path for path, _, _ in reader.found))
 
 
-def _problem(source: str, line: int, expected: Message, path: Where = ()) -> Problem:
+def _problem(source: str, path: Where, line: int, expected: Message) -> Problem:
     return Problem(messages.LINE(file=source, line=line), field_name(path), expected)
 
 
-class _RefusedError(yaml.YAMLError):
+class _RefusedError(yaml.MarkedYAMLError):
     """Something of YAML that no settings file needs."""
 
-    def __init__(self, line: int, expected: Message) -> None:
-        self.line, self.expected = line, expected
-        super().__init__(str(expected))
+    def __init__(self, mark: yaml.Mark, expected: Message) -> None:
+        self.expected = expected
+        super().__init__(problem_mark=mark)
 
 
 def _refusal(error: Exception, text: str) -> tuple[int, Message]:
     """Return the line of what cannot be read, and what was expected there."""
     match error:
-        case _RefusedError():
-            return error.line, error.expected
+        case _RefusedError(problem_mark=yaml.Mark() as mark):
+            return mark.line + 1, error.expected
         case yaml.MarkedYAMLError(problem_mark=yaml.Mark() as mark):
             words = shortened(f"{error.context or ''} {error.problem or ''}".strip(), 200)
             is_tab = text[mark.index : mark.index + 1] == "\t"
             return mark.line + 1, messages.TAB() if is_tab else messages.NOT_YAML(error=words)
         case UnicodeDecodeError(start=start):
-            line = error.object.count(b"\n", 0, start) + 1
-            return line, messages.NOT_UTF8(byte=f"{error.object[start]:02x}")
+            return error.object.count(b"\n", 0, start) + 1, messages.NOT_UTF8(byte=f"{error.object[start]:02x}")
     position = error.position if isinstance(error, ReaderError) else 0
     return text.count("\n", 0, position) + 1, messages.NOT_PRINTABLE()
 
@@ -116,9 +114,10 @@ def _refusal(error: Exception, text: str) -> tuple[int, Message]:
 class _Reader(yaml.SafeLoader):
     """PyYAML's nodes as plain values, with their lines and problems."""
 
+    NON_PRINTABLE = re.compile("[^\t\n\r\x20-\x7e\xa0-\u2027\u202a-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+    """As PyYAML's, with the characters that break lines in YAML 1.1 only."""
+
     def __init__(self, text: str) -> None:
-        if other := _BREAK_OF_1_1.search(text):
-            raise _RefusedError(text.count("\n", 0, other.start()) + 1, messages.NOT_PRINTABLE())
         super().__init__(text)
         self.lines: dict[Where, int] = {}
         self.found: list[tuple[Where, int, Message]] = []
@@ -129,24 +128,22 @@ class _Reader(yaml.SafeLoader):
         try:
             return super().get_single_node()
         except (ValueError, OverflowError):  # PyYAML passes \\UFFFFFFFF to chr() unchecked
-            raise _RefusedError(self.line + 1, messages.NOT_UNICODE()) from None
+            raise _RefusedError(self.get_mark(), messages.NOT_UNICODE()) from None
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         """Compose a node; refuse references and tags, and what is too deep or too much."""
         event = self.peek_event()
-        line = event.start_mark.line + 1
-        anchor, tag = getattr(event, "anchor", None), getattr(event, "tag", None)
-        if anchor is not None:
-            sign = "*" if isinstance(event, yaml.AliasEvent) else "&"
-            raise _RefusedError(line, messages.NOT_PLAIN(found=shortened(sign + anchor)))
+        mark, tag = event.start_mark, getattr(event, "tag", None)
+        if event.anchor is not None:
+            tag = ("*" if isinstance(event, yaml.AliasEvent) else "&") + event.anchor
         if tag is not None:
-            raise _RefusedError(line, messages.NOT_PLAIN(found=shortened(tag)))
+            raise _RefusedError(mark, messages.NOT_PLAIN(found=shortened(tag)))
         self._depth += 1
         self._values += 1
         if self._depth > DEEPEST:
-            raise _RefusedError(line, messages.TOO_DEEP(levels=DEEPEST))
+            raise _RefusedError(mark, messages.TOO_DEEP(levels=DEEPEST))
         if self._values > MOST_VALUES:
-            raise _RefusedError(line, messages.TOO_MANY(number=MOST_VALUES))
+            raise _RefusedError(mark, messages.TOO_MANY(number=MOST_VALUES))
         node = super().compose_node(parent, index)
         self._depth -= 1
         return node
@@ -160,18 +157,15 @@ class _Reader(yaml.SafeLoader):
             return [self.plain(item, (*path, place)) for place, item in enumerate(node.value)]
         entries: dict[str, Any] = {}
         for key, value in node.value:
-            is_word = isinstance(key, yaml.ScalarNode)
-            here = (*path, key.value or "?") if is_word else path
+            here = (*path, key.value or "?") if isinstance(key, yaml.ScalarNode) else path
             before = len(self.found)
-            name = self._scalar(key, here) if is_word else None
+            name = self.plain(key, here)
             if isinstance(name, str) and name in entries:
                 self._note(here, key, messages.TWICE(line=self.lines[here]))
             elif isinstance(name, str):
-                self.lines[here] = _line(key)
                 entries[name] = self.plain(value, here)
             elif len(self.found) == before:
-                given = name if is_word else self.plain(key, here)
-                self._note(here, key, messages.KEY(found=found(given)))
+                self._note(here, key, messages.KEY(found=found(name)))
         return entries
 
     def _scalar(self, node: yaml.ScalarNode, path: Where) -> str | int | float | bool | None:
