@@ -5,9 +5,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from hmi.past.past import FullRecord, Summary, judged_of
 from station.channel.panel import ListedAlarm
 from station.channel.panel_maintenance_queries import PartHealth
-from station.channel.panel_queries import InspectionRow, InspectionView, LotView
+from station.channel.panel_queries import LotView
 from station.messages.message import Message
 from station.vocabulary import OutcomeName
 
@@ -132,7 +133,7 @@ class InspectionSummary(Model):
     reasons: list[str] = Field(description="The first one decided; empty only for PASS.")
 
     @classmethod
-    def of(cls, row: InspectionRow) -> "InspectionSummary":
+    def of(cls, row: Summary) -> "InspectionSummary":
         """Convert the station's answer."""
         return cls(
             sequence=row.sequence,
@@ -203,38 +204,39 @@ class InspectionDetails(Model):
     size_class: int | None = Field(description="Likewise.")
 
     @classmethod
-    def of(cls, reply: InspectionView) -> "InspectionDetails":
-        """Convert the station's answer."""
-        standing = reply.standing
+    def of(cls, record: FullRecord) -> "InspectionDetails":
+        """Convert a record."""
+        trigger, standing, judged = record.trigger, record.standing, judged_of(record)
+        recipe = trigger.recipe
         return cls(
-            sequence=reply.sequence,
-            trigger_id=reply.trigger_id,
-            encoder=reply.encoder,
-            began=moment(reply.began_utc_ms),
+            sequence=record.sequence,
+            trigger_id=trigger.trigger_id,
+            encoder=trigger.encoder,
+            began=moment(trigger.began_utc_ms),
             ended=None if standing is None else moment(standing.ended_utc_ms),
             duration_s=None if standing is None else standing.duration_ms / 1000,
-            lot=reply.lot,
-            simulated=reply.simulated,
+            lot=trigger.lot,
+            simulated=trigger.simulated,
             outcome=None if standing is None else standing.outcome,
-            reasons=list(reply.reasons),
-            explanation=[str(message) for message in reply.explanation],
-            messages=[ApiMessage.of(message) for message in reply.explanation],
+            reasons=[] if standing is None else list(map(str, standing.reasons)),
+            explanation=[str(message) for message in judged.explanation],
+            messages=[ApiMessage.of(message) for message in judged.explanation],
             late=None if standing is None else standing.late,
             partial=None if standing is None else standing.partial,
             area_mm2=None if standing is None else standing.area_mm2,
             closing_mm=None if standing is None else standing.closing_mm,
             confidence=None if standing is None else standing.confidence,
-            recipe=reply.recipe_name,
-            recipe_revision=reply.recipe_revision,
-            recipe_sha256=reply.recipe_sha256,
-            curve=[Point(**{**point.model_dump(), "flags": list(point.flags)}) for point in reply.curve],
-            devices=reply.devices,
-            versions=reply.versions,
-            images=[image.sha256 for image in reply.images if image.there],
-            published=None if reply.published_utc_ms is None else moment(reply.published_utc_ms),
-            acknowledged=None if reply.acknowledged_utc_ms is None else moment(reply.acknowledged_utc_ms),
-            fruit_length_mm=reply.fruit_length_mm,
-            size_class=reply.size_class,
+            recipe=recipe.name if recipe else "",
+            recipe_revision=recipe.revision if recipe else "",
+            recipe_sha256=recipe.sha256 if recipe else "",
+            curve=[Point.model_validate(point, from_attributes=True) for point in judged.curve],
+            devices=dict(judged.devices),
+            versions=dict(judged.versions),
+            images=[image.sha256 for image in record.images],
+            published=None if record.published_utc_ms is None else moment(record.published_utc_ms),
+            acknowledged=None if record.acknowledged_utc_ms is None else moment(record.acknowledged_utc_ms),
+            fruit_length_mm=trigger.size.length_mm,
+            size_class=trigger.size.size_class,
         )
 
 

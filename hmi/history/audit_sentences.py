@@ -5,9 +5,9 @@ import re
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from hmi.past.past import AuditRow
 from hmi.web.text import texts
 from hmi.web.translation import NO_VALUE, Locale
-from station.channel.panel_queries import AuditRowView
 from station.messages import alarms
 from station.messages.alarms import AlarmTexts
 
@@ -28,11 +28,11 @@ class Sentence(NamedTuple):
     """Why a command was not done, and what changed, each as `name: old → new`."""
 
 
-def sentence(row: AuditRowView, fruit: Mapping[int, str], locale: Locale) -> Sentence:
+def sentence(row: AuditRow, fruit: Mapping[int, str], locale: Locale) -> Sentence:
     """Write a row as a sentence.
 
     Args:
-        row: of the trail; long values are shortened, and then no JSON.
+        row: of the trail.
         fruit: titles of the recipes by their PLC numbers.
         locale: the reader's.
     """
@@ -49,12 +49,12 @@ def sentence(row: AuditRowView, fruit: Mapping[int, str], locale: Locale) -> Sen
     return Sentence(_who(row, locale), what, (*why, *_changes(old, new)))
 
 
-def _who(row: AuditRowView, locale: Locale) -> str:
+def _who(row: AuditRow, locale: Locale) -> str:
     role = locale.own(f"role.{row.role}", locale.own(f"audit.role.{row.role}", row.role))
     return role if row.who == row.role else f"{row.who}, {role}"
 
 
-def _subject(row: AuditRowView, locale: Locale) -> str:
+def _subject(row: AuditRow, locale: Locale) -> str:
     kind, _, rest = row.subject.partition(" ")
     if kind == "alarm" and (known := _ALARMS.get(rest)):
         return str(locale.sentence(known.cause()))
@@ -89,7 +89,7 @@ def _written(value: Any) -> str:
     return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}…"
 
 
-def _mapping(text: str) -> dict[str, Any]:
+def _mapping(text: str | None) -> dict[str, Any]:
     try:
         value = json.loads(text) if text else {}
     except ValueError:

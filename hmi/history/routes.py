@@ -1,5 +1,6 @@
 """History page: search, one inspection with all images and stages, exports and reports, the audit trail."""
 
+import json
 from collections import OrderedDict
 from datetime import datetime
 from typing import Annotated, Any, Literal
@@ -12,6 +13,7 @@ from starlette.responses import Response
 from hmi.common.charts import area_over_closing, mark_decided
 from hmi.history.audit_sentences import sentence
 from hmi.history.chips import chips, days
+from hmi.past.past import FullRecord, Page, Stages, judged_of
 from hmi.web.access import GenuineCaller, HmiNow, LocaleNow, caller_of
 from hmi.web.context import Hmi
 from hmi.web.gateway import actor_of
@@ -21,15 +23,7 @@ from hmi.web.problem import Problem
 from hmi.web.sessions import Caller
 from hmi.web.translation import Locale
 from station.channel.panel import Actor
-from station.channel.panel_queries import (
-    InspectionPage,
-    InspectionView,
-    JobView,
-    Search,
-    Stages,
-    StartExport,
-    StartLotReport,
-)
+from station.channel.panel_queries import JobView, Search, StartExport, StartLotReport
 from station.charts.area_chart import Curve, Limit, Mark
 from station.charts.spark import spark
 from station.messages.reasons import reason_message
@@ -90,7 +84,7 @@ async def search(
     terms |= {"from": begun_from, "to": begun_to}
     today = datetime.now().astimezone()
     wanted = None if typed else search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
-    found = InspectionPage(rows=(), below=None)
+    found = Page((), None)
     if wanted is not None:
         found = await hmi.past.find(wanted, PAGE, below)
     recipes = (await hmi.past.recipes.read()).states
@@ -156,8 +150,7 @@ async def audit(request: Request, hmi: HmiNow, locale: LocaleNow, action: Words 
 @router.get("/image/{sha256}.png")
 async def image(hmi: HmiNow, sha256: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]) -> Response:
     """Send a stored image; its address is its content hash, so the browser fetches it once."""
-    reply = await hmi.past.image(sha256)
-    return Response(reply.data, media_type=reply.media_type, headers=_FOR_EVER)
+    return Response(await hmi.past.image(sha256), media_type="image/png", headers=_FOR_EVER)
 
 
 @router.get("/{sequence}")
@@ -169,13 +162,15 @@ async def inspection(request: Request, hmi: HmiNow, locale: LocaleNow, sequence:
         request,
         "inspection.html.j2",
         reply=reply,
+        judged=judged_of(reply),
+        values=_recipe(reply),
         before=before,
         after=after,
-        reasons=[(code, reason_message(code)) for code in reply.reasons],
+        reasons=[(str(code), reason_message(code)) for code in (reply.standing.reasons if reply.standing else ())],
         limit=_deciding_limit(reply),
         chart=_chart(reply, locale),
         steps=_steps(reply),
-        reference=next((each for each in reply.images if each.kind == "reference" and each.there), None),
+        reference=next((each for each in reply.images if each.kind == "reference"), None),
     )
 
 
@@ -188,7 +183,7 @@ async def step(request: Request, hmi: HmiNow, sequence: int, step: int) -> Respo
     if found is None:
         raise Problem(404, "problem.not_found")
     stages = None
-    if found["image"] and any(each.kind == "reference" and each.there for each in reply.images):
+    if found["image"] and any(each.kind == "reference" for each in reply.images):
         stages = await _stages(hmi, sequence, step)
     return show(
         request,
@@ -207,8 +202,7 @@ async def stage(hmi: HmiNow, sequence: int, step: int, place: int) -> Response:
     stages = await _stages(hmi, sequence, step)
     if not 0 <= place < len(stages.pictures):
         raise Problem(404, "problem.not_found")
-    picture = stages.pictures[place][1]
-    return Response(picture.data, media_type=picture.media_type)
+    return Response(stages.pictures[place][1], media_type="image/jpeg")
 
 
 _STAGES: OrderedDict[tuple[int, int], Stages] = OrderedDict()
@@ -228,7 +222,7 @@ async def _stages(hmi: Hmi, sequence: int, step: int) -> Stages:
     return reply
 
 
-async def _inspection(hmi: Hmi, sequence: int) -> InspectionView:
+async def _inspection(hmi: Hmi, sequence: int) -> FullRecord:
     if not 0 < sequence < 2**32:
         raise Problem(404, "problem.not_found")
     return await hmi.past.inspection(sequence)
@@ -245,20 +239,25 @@ async def _neighbours(hmi: Hmi, sequence: int) -> tuple[int | None, int | None]:
     return (earlier[0].sequence if earlier else None), after
 
 
-def _steps(reply: InspectionView) -> list[dict[str, Any]]:
+def _steps(reply: FullRecord) -> list[dict[str, Any]]:
     """Return every point of the curve, with its image and mask where these are stored."""
-    stored = {(each.kind, each.step): each for each in reply.images if each.there}
+    stored = {(each.kind, each.step): each for each in reply.images}
     return [
         {"point": point, "image": stored.get(("step", point.step)), "mask": stored.get(("mask", point.step))}
-        for point in reply.curve
+        for point in judged_of(reply).curve
     ]
 
 
-def _limits(reply: InspectionView) -> tuple[list[Limit], float | None]:
+def _recipe(reply: FullRecord) -> dict[str, Any] | None:
+    """Return the recipe's values as they were then."""
+    return json.loads(reply.trigger.recipe.text) if reply.trigger.recipe else None
+
+
+def _limits(reply: FullRecord) -> tuple[list[Limit], float | None]:
     """Return the limits of the recipe at that time for this fruit's size, and its early stop; none if unknown."""
-    factor = float(reply.measures.get("limit_factor") or 1.0)
+    factor = float(judged_of(reply).measures.get("limit_factor") or 1.0)
     try:
-        recipe = reply.recipe or {}
+        recipe = _recipe(reply) or {}
         limits = [
             Limit(each["closing_mm"], factor * each["area_mm2"], factor * each.get("least_area_mm2", 0.0))
             for each in recipe["damage"]["area"]
@@ -268,7 +267,7 @@ def _limits(reply: InspectionView) -> tuple[list[Limit], float | None]:
         return [], None
 
 
-def _deciding_limit(reply: InspectionView) -> Limit | None:
+def _deciding_limit(reply: FullRecord) -> Limit | None:
     """Return the limit nearest to where the fruit was decided; None if there was no area."""
     decided_mm = reply.standing.closing_mm if reply.standing is not None else None
     if decided_mm is None:
@@ -276,14 +275,14 @@ def _deciding_limit(reply: InspectionView) -> Limit | None:
     return min(_limits(reply)[0], key=lambda limit: abs(limit.closing_mm - decided_mm), default=None)
 
 
-def _chart(reply: InspectionView, locale: Locale) -> Markup | None:
+def _chart(reply: FullRecord, locale: Locale) -> Markup | None:
     """Draw the curve with the limits of the recipe at that time."""
     points = [
         (point.closing_mm, point.area_mm2)
-        for point in reply.curve
+        for point in judged_of(reply).curve
         if point.closing_mm is not None and point.area_mm2 is not None and point.closing_mm >= 0
     ]
-    if reply.recipe is None:
+    if reply.trigger.recipe is None:
         return None
     limits, early = _limits(reply)
     label = locale.text("chart.fruit_label", n=reply.sequence)

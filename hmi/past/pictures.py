@@ -1,12 +1,12 @@
 """Pictures for the pages: stored images, and the measurement's stages on them."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from station.calibration.gate import gated
-from station.channel.panel_queries import Picture, Stages
 from station.messages import records as messages
 from station.messages.message import message_of
 from station.records.database import reading
@@ -24,7 +24,16 @@ LARGEST_IMAGE_BYTES = 8 * 1024 * 1024
 _JPEG_QUALITY = 88
 
 
-def read_image(folder: Path, sha256: str) -> Picture:
+class Stages(NamedTuple):
+    """The stages of a measurement, measured again from the stored image."""
+
+    pictures: tuple[tuple[str, bytes], ...]
+    """Names and JPEG files, in order."""
+    area_px: int
+    """As measured again."""
+
+
+def read_image(folder: Path, sha256: str) -> bytes:
     """Read one stored image.
 
     Args:
@@ -34,7 +43,7 @@ def read_image(folder: Path, sha256: str) -> Picture:
     Raises:
         RecordsError: it is not stored any more.
     """
-    return Picture(media_type="image/png", data=_file(image_path(folder, sha256)))
+    return _file(image_path(folder, sha256))
 
 
 def read_stages(folder: Path, sequence: int, step: int) -> Stages:
@@ -55,7 +64,7 @@ def read_stages(folder: Path, sequence: int, step: int) -> Stages:
     image = _picture(_stored(record, "step", step))
     if reference.shape != image.shape:
         raise RecordsError(messages.IMAGES_DIFFER(), messages.OPEN_ANOTHER_STEP())
-    pictures: list[tuple[str, Picture]] = []
+    pictures: list[tuple[str, bytes]] = []
 
     def take(name: str, picture: np.ndarray) -> None:
         pictures.append((name, _jpeg(picture)))
@@ -67,7 +76,7 @@ def read_stages(folder: Path, sequence: int, step: int) -> Stages:
     for before in range(step):
         previous = tracker.measure_step([_picture(_stored(record, "step", before))])
     contact = method.measure(image, take, previous)
-    return Stages(pictures=tuple(pictures), area_px=contact.area_px)
+    return Stages(tuple(pictures), contact.area_px)
 
 
 def _gate_factor(record: FullRecord) -> float:
@@ -102,6 +111,5 @@ def _picture(image: StoredImage) -> Image:
     return np.asarray(picture, np.uint8)
 
 
-def _jpeg(picture: np.ndarray) -> Picture:
-    data = cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY))[1].tobytes()
-    return Picture(media_type="image/jpeg", data=data)
+def _jpeg(picture: np.ndarray) -> bytes:
+    return cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY))[1].tobytes()

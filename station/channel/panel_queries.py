@@ -1,14 +1,13 @@
-"""Queries of the operators' pages on the records: inspections, pictures, lots, audit trail, exports.
+"""Orders of the operators' pages on the records: lots, exports, reports; and their jobs.
 
 Every answer is bounded: lists come a page at a time, files piece by piece. A long operation is a job: it is started,
 polled, and its files are then read.
 """
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
-from station.channel.line import Outcome
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.messages.message import Message
@@ -21,7 +20,6 @@ LARGEST_CHUNK_BYTES = 4 * 1024 * 1024
 Sequence = Annotated[int, Field(ge=1, lt=2**32)]
 Text = Annotated[str, Field(max_length=64)]
 Why = Annotated[str, Field(min_length=1, max_length=1000)]
-Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 UtcMs = Annotated[int, Field(ge=0, lt=2**63)]
 
 
@@ -38,108 +36,12 @@ class Search(ChannelMessage):
     reason: Reason | None = None
 
 
-class InspectionRow(ChannelMessage):
-    """One inspection in a list."""
-
-    sequence: int
-    trigger_id: int
-    began_utc_ms: int
-    lot: str
-    grower: str
-    fruit: str
-    outcome: OutcomeName | None
-    """None while it runs."""
-    reasons: tuple[str, ...]
-    areas_mm2: tuple[float | None, ...]
-    duration_ms: int | None
-
-
-class InspectionPage(ChannelMessage):
-    """One page of a search's results."""
-
-    rows: tuple[InspectionRow, ...]
-    below: int | None
-    """The cursor of the next page; None for the last one."""
-
-
-class CurvePointView(ChannelMessage):
-    """One width step."""
-
-    step: int
-    width_mm: float
-    closing_mm: float | None
-    area_mm2: float | None
-    area_px: int | None
-    confidence: float | None
-    flags: tuple[str, ...]
-    changed_area_mm2: float | None = None
-    """Changed fraction of the image; None in older records, and for a method without it."""
-    changed_area_px: int | None = None
-
-
-class ImageView(ChannelMessage):
-    """A stored image."""
-
-    kind: Literal["reference", "step", "mask"]
-    step: int | None
-    sha256: str
-    there: bool
-    """Whether its file still exists."""
-
-
-class InspectionView(ChannelMessage):
-    """All data of one inspection."""
-
-    sequence: int
-    trigger_id: int
-    encoder: int
-    lot: str
-    began_utc_ms: int
-    simulated: bool
-    standing: Outcome | None
-    """The published outcome, or the one to be published; None while it runs."""
-    judged: OutcomeName | None
-    reasons: tuple[str, ...]
-    """Of the final outcome."""
-    explanation: tuple[Message, ...]
-    judgement: Message | None = None
-    """The area with its uncertainty and its limit; None if it was not measured."""
-    first_press_findings: Message | None = None
-    """Why the first press did not decide; None if the fruit was pressed once."""
-    curve: tuple[CurvePointView, ...]
-    recipe_name: str
-    recipe_revision: str
-    recipe_sha256: str
-    recipe: dict[str, Any] | None
-    """Its values as they were then."""
-    phases_s: dict[str, float]
-    measures: dict[str, float | int | str | bool | None]
-    devices: dict[str, str]
-    versions: dict[str, str]
-    images: tuple[ImageView, ...]
-    images_state: Message | None
-    """None of one that runs."""
-    published_utc_ms: int | None
-    acknowledged_utc_ms: int | None
-    fruit_length_mm: float | None = None
-    """As the PLC gave it with the trigger; None where it did not."""
-    size_class: int | None = None
-
-
 class Picture(ChannelMessage):
     """A picture's file."""
 
     model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
     media_type: str
     data: bytes
-
-
-class Stages(ChannelMessage):
-    """The stages' pictures in their order, measured again from the stored image."""
-
-    pictures: tuple[tuple[str, Picture], ...]
-    area_px: int
-    """As measured again."""
 
 
 class LotView(ChannelMessage):
@@ -167,20 +69,6 @@ class EndLot(ChannelMessage):
     purpose: ClassVar[str] = "to end a lot"
     name: str = Field(min_length=1, max_length=32)
     actor: Actor
-
-
-class AuditRowView(ChannelMessage):
-    """One row of the audit trail; `old` and `new` are JSON, shortened where they are long."""
-
-    seq: int
-    utc_ms: int
-    who: str
-    role: str
-    action: str
-    subject: str
-    reason: str
-    old: str
-    new: str
 
 
 class StartExport(ChannelMessage):

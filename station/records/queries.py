@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import Connection, func, select, true
 
-from station.channel.line import Outcome
+from station.channel.line import Outcome, OutcomeName
 from station.messages import records as messages
 from station.records.database import plain
 from station.records.errors import UnknownInspectionError
@@ -38,7 +38,7 @@ class Summary(NamedTuple):
     grower: str
     """Empty if it was not registered."""
     fruit: str
-    outcome: str | None
+    outcome: OutcomeName | None
     """None while it runs."""
     reasons: tuple[str, ...]
     areas_mm2: tuple[float | None, ...]

@@ -1,22 +1,20 @@
 """Rows of the audit trail as sentences: who, what, what changed, and why not."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from hmi.history.audit_sentences import sentence
 from hmi.web.translation import Locale
-from station.channel.panel_queries import AuditRowView
+from station.records.audit import AuditRow
 
 FRUIT = {2: "Blueberry", 7: "Elsanta"}
 
 
 def row(action, subject="station", who="Ida", role="quality", reason="", old=None, new=None):
-    values = ("" if value is None else json.dumps(value) for value in (old, new))
-    return AuditRowView(
-        seq=1, utc_ms=1, who=who, role=role, action=action, subject=subject, reason=reason, old=next(values),
-        new=next(values),
-    )  # fmt: skip
+    before, after = (None if value is None else json.dumps(value) for value in (old, new))
+    return AuditRow(1, 1, who, role, action, subject, reason, before, after, "", "")
 
 
 @pytest.mark.parametrize(("number", "named"), [(2, "Heidelbeere"), (7, "Elsanta"), (9, "9")])
@@ -46,5 +44,5 @@ def test_a_changed_limit_is_shown_and_fingerprints_are_not():
 
 
 def test_a_row_of_another_version_or_with_shortened_values_is_shown_all_the_same():
-    cut = row("press.polished", "jaws").model_copy(update={"new": '{"text": "# a rec'})
+    cut = replace(row("press.polished", "jaws"), new='{"text": "# a rec')
     assert sentence(cut, {}, Locale("en")) == ("Ida, Quality", "press.polished: jaws", ())

@@ -76,6 +76,23 @@ def test_recipes_their_history_and_past_curves_are_there_while_the_station_is_aw
         assert (whole["revision"], whole["values"]["name"]) == (1, "strawberry")
 
 
+def test_a_fruit_that_was_never_judged_has_a_page_too(pages, tmp_path):
+    async def begin() -> int:
+        records = await Records.open(tmp_path / "records", RecordsSettings(deadline_s=20.0, free_reserve_mb=1), "boot")
+        try:
+            return await records.begin(Trigger(7, 1234, "A-17", 1_700_000_000_000, None, True))
+        finally:
+            await records.close()
+
+    sequence = asyncio.run(begin())
+    with pages.context.past:
+        log_in(pages, "Ana", Role.ADMIN)
+        status, _, body = pages("GET", f"/history/{sequence}")
+        assert (status, b"A-17" in body) == (200, True)
+        whole = json.loads(pages("GET", f"/api/v1/inspections/{sequence}")[2])
+        assert (whole["outcome"], whole["curve"], whole["recipe"]) == (None, [], "")
+
+
 def test_a_fruit_that_there_is_not_is_said(pages, fruit):
     with pages.context.past:
         log_in(pages, "Ana", Role.ADMIN)
