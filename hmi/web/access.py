@@ -85,6 +85,5 @@ def _with_right(caller: Caller, right: Right) -> Caller:
 
 
 HmiNow = Annotated[Hmi, Depends(hmi_of)]
-CallerNow = Annotated[Caller, Depends(caller_of)]
 GenuineCaller = Annotated[Caller, Depends(genuine)]
 LocaleNow = Annotated[Locale, Depends(locale_of)]

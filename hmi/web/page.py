@@ -13,9 +13,6 @@ from hmi.web.navigation import entries
 from hmi.web.roles import Right, Role
 from hmi.web.translation import Locale
 
-FRAME_PARTS = ("frame.alarm", "frame.state")
-"""On every page."""
-
 
 def show(request: Request, template: str, *, status: int = 200, **values: Any) -> Response:
     """Answer with a page.

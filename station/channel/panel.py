@@ -65,8 +65,6 @@ class AlarmList(ChannelMessage):
     """Alarms, most urgent first; shelved ones are included."""
 
     alarms: tuple[ListedAlarm, ...]
-    longest_shelved_s: float
-    """For so long one can be shelved at most."""
 
 
 class AlarmAction(ChannelMessage):
@@ -93,7 +91,7 @@ class ShelveAlarm(AlarmAction):
     reason: str = Field(max_length=1000)
     """The reason; never empty."""
     for_s: float = Field(gt=0, allow_inf_nan=False)
-    """Duration, `AlarmList.longest_shelved_s` at most."""
+    """Duration, 8 h at most."""
 
 
 class UnshelveAlarm(AlarmAction):

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Self, TypeVar
 
 from sqlalchemy import Connection
 
@@ -26,7 +26,6 @@ from station.records.queries import read_alarm_log, read_alarms, read_inspection
 from station.records.write_requests import (
     acknowledge,
     add_counts,
-    add_event,
     begin_again,
     conclude,
     insert_trigger,
@@ -306,10 +305,6 @@ class Records:
     async def count(self, by: Mapping[str, int]) -> dict[str, int]:
         """Add to counters that outlive restarts, and return all of them."""
         return await self._ask(lambda connection: add_counts(connection, by))
-
-    async def note_event(self, name: str, details: Mapping[str, Any], sequence: int | None = None) -> None:
-        """Append to the events, with the time."""
-        await self._ask(lambda connection: add_event(connection, name, sequence, details))
 
     async def audit(self, *entries: AuditEntry) -> tuple[AuditRow, ...]:
         """Append to the audit trail, in one transaction.

@@ -3,7 +3,6 @@
 import difflib
 import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
@@ -15,26 +14,12 @@ from station.settings.model import Settings
 from station.settings.problems import FieldError, Problem, SettingsError, WantedError, shortened
 from station.settings.problems import Path as Where
 from station.settings.schema import Node, expectation, find, found, names, schema_of
-from station.settings.yaml_loader import Document, read_document
+from station.settings.yaml_loader import Document
 
 Model = TypeVar("Model", bound=Settings)
 
 Locate = Callable[[Where], tuple[Message, Message]]
 """Says where a value was written and what it is called there: `file:line` and `modbus.port`."""
-
-
-def load_file(model: type[Model], path: Path) -> Model:
-    """Read a YAML file into a model.
-
-    Args:
-        model: the expected content.
-        path: the file.
-
-    Raises:
-        SettingsError: all problems of the file, in the order of its lines.
-    """
-    document = read_document(path)
-    return validated(model, document, document.value, document.locate)
 
 
 def validated(model: type[Model], document: Document, value: Any, locate: Locate) -> Model:

@@ -59,12 +59,12 @@ class Fingers:
             await self._ticked.wait()
             if self._stopped.is_set():
                 raise GripperStoppedError(gripper_messages.STOPPED(), gripper_messages.REMEDY_STOPPED())
-        return MoveResult(width_mm, 0, await self.read())
+        return MoveResult(width_mm, await self.read())
 
     async def open(self, width_mm: float | None = None) -> MoveResult:
         self._from, self._to_mm = (self.now_s, width_mm or self.max_width_mm), width_mm or self.max_width_mm
         self.opened_to_mm.append(self._to_mm)
-        return MoveResult(self._to_mm, 0, await self.read())
+        return MoveResult(self._to_mm, await self.read())
 
     async def stop(self) -> GripperReading:
         self.stops += 1

@@ -37,7 +37,6 @@ PROMETHEUS = DataSourceRef(type_val="prometheus", uid="prometheus")
 POSTGRESQL = DataSourceRef(type_val="grafana-postgresql-datasource", uid="postgresql")
 DOCS = "${docs}"
 """The variable with the documents' address."""
-WIDTH = 24
 HEIGHT = 8
 
 

@@ -1,6 +1,5 @@
 """Tactile camera interface of the station."""
 
-import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -96,11 +95,6 @@ class Frame:
     faults: frozenset[FrameFault] = frozenset()
     width_mm: float | None = None
     """The gripper's width that was recorded with it; only in a replay."""
-
-    @property
-    def content_hash(self) -> str:
-        """Return the pixels' BLAKE2b, 16 bytes in hexadecimal; it takes about a millisecond, so only on demand."""
-        return hashlib.blake2b(np.ascontiguousarray(self.image).data, digest_size=16).hexdigest()
 
 
 @dataclass(frozen=True, slots=True)

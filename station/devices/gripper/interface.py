@@ -53,7 +53,6 @@ class MoveResult:
     """Result of a move."""
 
     requested_width_mm: float
-    requested_count: int
     reading: GripperReading
     """The gripper at the end of the move."""
 

@@ -164,7 +164,7 @@ class Robotiq2F85:
             reading = self._reading(status, at_s)
             if reading.object_state == ObjectState.CONTACT_CLOSING:
                 self._held_request = sent
-            return MoveResult(width_mm, count, reading)
+            return MoveResult(width_mm, reading)
 
     async def stop(self) -> GripperReading:
         """Stop where the fingers are; moves under way or waiting end with `GripperStoppedError`. Idempotent.

@@ -38,7 +38,7 @@ class AlarmCommands:
 
     async def list_alarms(self, _request: ListAlarms) -> AlarmList:
         """List the alarms that are not in their normal state."""
-        return AlarmList(alarms=self.active(), longest_shelved_s=LONGEST_SHELVED_S)
+        return AlarmList(alarms=self.active())
 
     def active(self) -> tuple[ListedAlarm, ...]:
         """List the same alarms, most urgent first."""

@@ -63,11 +63,6 @@ class Liveness:
         self._within_s[name] = within_s
         self._last_s[name] = self._clock()
 
-    def unwatch(self, name: str) -> None:
-        """Stop monitoring a name."""
-        self._within_s.pop(name, None)
-        self._last_s.pop(name, None)
-
     def progress(self, name: str) -> None:
         """Note progress; a name that is not monitored is ignored."""
         if name in self._last_s:
