@@ -17,7 +17,6 @@ from hmi.web.translation import Locale
 from station.channel.line import CommandDone
 from station.channel.messages import ChannelMessage, RefusedError
 from station.channel.panel import AcknowledgeAlarm, ShelveAlarm, UnshelveAlarm
-from station.channel.panel_live import AlarmHistory, GetAlarmHistory
 
 router = APIRouter()
 ENTRY = Entry("alarms", "/alarms")
@@ -55,8 +54,7 @@ async def alarms(request: Request) -> Response:
 @router.get("/alarms/history")
 async def history(request: Request, hmi: HmiNow) -> Response:
     """Show recent changes of alarms."""
-    found = await hmi.gateway.request(GetAlarmHistory(most=_LAST), AlarmHistory)
-    return show(request, "alarms_history.html.j2", changes=found.changes)
+    return show(request, "alarms_history.html.j2", changes=await hmi.past.alarm_changes(_LAST))
 
 
 @router.get("/alarms/{alarm}")

@@ -7,7 +7,7 @@ cycle nothing but a share of the processor.
 import io
 from dataclasses import replace
 from pathlib import Path
-from typing import Self
+from typing import NamedTuple, Self
 
 import cv2
 
@@ -16,17 +16,21 @@ from hmi.past.recipes import PastRecipes
 from hmi.past.tried import Tried, read_tried
 from station.channel.panel_queries import LotView, Search
 from station.channel.worker import PanelBusyError, PanelWorker
+from station.inspection.alarm_table import ALARMS
+from station.messages.message import Message, message_in, verbatim
 from station.records.audit import AuditRow
 from station.records.audit_report import read_audit
 from station.records.database import reading
 from station.records.errors import RecordsError, UnknownInspectionError
 from station.records.lots import read_lots
-from station.records.model import FullRecord, InspectionRecord
-from station.records.queries import Summary, read_inspection
+from station.records.model import AlarmEntry, FullRecord, InspectionRecord
+from station.records.queries import Summary, read_alarm_log, read_inspection
 from station.records.search import Page, Query, find_page
 from station.settings.configuration import Configuration
 from station.settings.recipe_model import Recipe
 from station.support.bundle import bundle
+
+_ALARM_ROWS = {str(alarm): row for alarm, row in ALARMS.items()}
 
 __all__ = [
     "AuditRow",
@@ -41,6 +45,17 @@ __all__ = [
     "UnknownInspectionError",
     "judged_of",
 ]
+
+
+class AlarmChange(NamedTuple):
+    """One change of one alarm."""
+
+    utc_ms: int
+    number: int | None
+    """None for an alarm of another version."""
+    cause: Message
+    change: str
+    detail: Message | None
 
 
 class Past:
@@ -113,6 +128,15 @@ class Past:
 
         return await self._worker.do(read)
 
+    async def alarm_changes(self, limit: int) -> list[AlarmChange]:
+        """Return the latest changes of alarms, newest first."""
+
+        def read() -> list[AlarmChange]:
+            with reading(self._folder) as connection:
+                return [_alarm_change(entry) for entry in read_alarm_log(connection, limit)]
+
+        return await self._worker.do(read)
+
     async def image(self, sha256: str) -> bytes:
         """Return one stored image, a PNG file."""
         return await self._worker.do(lambda: read_image(self._folder, sha256))
@@ -134,6 +158,12 @@ class Past:
             return file.getvalue()
 
         return await self._worker.do(write)
+
+
+def _alarm_change(entry: AlarmEntry) -> AlarmChange:
+    row = _ALARM_ROWS.get(entry.id)
+    number, cause = (row.number, row.cause) if row else (None, verbatim(entry.id))
+    return AlarmChange(entry.utc_ms, number, cause, entry.change, message_in(entry.detail))
 
 
 def judged_of(record: FullRecord) -> InspectionRecord:

@@ -310,28 +310,3 @@ class Recipes(ChannelMessage):
     """The recipe of the next fruit; during a lot it may be an older revision."""
     problems: tuple[Message, ...]
     """Of the recipes' files."""
-
-
-class GetAlarmHistory(ChannelMessage):
-    """Query recent changes of alarms. Answered with `AlarmHistory`."""
-
-    purpose: ClassVar[str] = "for the alarms' history"
-    most: int = Field(default=100, ge=1, le=1000)
-
-
-class AlarmChange(ChannelMessage):
-    """One change of one alarm."""
-
-    utc_ms: int
-    id: str
-    number: int | None
-    """None for an alarm of another version."""
-    cause: Message
-    change: str
-    detail: Message | None
-
-
-class AlarmHistory(ChannelMessage):
-    """Changes, newest first."""
-
-    changes: tuple[AlarmChange, ...]

@@ -22,7 +22,7 @@ from station.records.errors import DamagedError, DiskFullError, RecordsClosedErr
 from station.records.images import MB, accepted_is_stored
 from station.records.model import AlarmEntry, AlarmRow, FullRecord, InspectionRecord, OpenInspections, Trigger
 from station.records.open import Notice, Opened, lock_folder, open_records
-from station.records.queries import read_alarm_log, read_alarms, read_inspection, read_open, read_totals
+from station.records.queries import read_alarms, read_inspection, read_open, read_totals
 from station.records.write_requests import (
     acknowledge,
     add_counts,
@@ -314,14 +314,6 @@ class Records:
             RecordsError: it may not be durable.
         """
         return await self._ask(lambda connection: tuple(append_audit(connection, entry) for entry in entries))
-
-    async def alarm_log(self, limit: int) -> tuple[AlarmEntry, ...]:
-        """Return the log of alarms, newest first.
-
-        Args:
-            limit: at most so many.
-        """
-        return await self._read(lambda connection: read_alarm_log(connection, limit))
 
     async def change(self, work: Work[T]) -> T:
         """Carry out a change of lots or holds, as `lambda connection: start_lot(connection, name, grower)`.

@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 
 from hmi.web.roles import Role
+from station.inspection.alarm_table import ALARMS
 from station.recipe_store.store import RecipeStore
 from station.records.audit import AuditEntry
 from station.records.lots import start_lot
-from station.records.model import InspectionRecord, RecipeSnapshot, Trigger
+from station.records.model import AlarmEntry, InspectionRecord, RecipeSnapshot, Trigger
 from station.records.records import Records
 from station.settings.recipe import find_recipe
 from station.settings.records import RecordsSettings
@@ -74,6 +75,23 @@ def test_recipes_their_history_and_past_curves_are_there_while_the_station_is_aw
         assert (status, b"7" in body) == (409, True)
         whole = json.loads(pages("GET", "/api/v1/recipes/strawberry")[2])
         assert (whole["revision"], whole["values"]["name"]) == (1, "strawberry")
+
+
+def test_changes_of_alarms_are_there_while_the_station_is_away(pages, tmp_path):
+    async def change() -> None:
+        records = await Records.open(tmp_path / "records", RecordsSettings(deadline_s=20.0, free_reserve_mb=1), "boot")
+        try:
+            entries = [AlarmEntry(1, "camera_lost", "raised", "USB"), AlarmEntry(2, "of_another_version", "cleared")]
+            await records.save_alarms([], entries)
+        finally:
+            await records.close()
+
+    asyncio.run(change())
+    with pages.context.past:
+        log_in(pages, "Ana", Role.ADMIN)
+        status, _, body = pages("GET", "/alarms/history")
+        assert (status, b"USB" in body, b"of_another_version" in body) == (200, True, True)
+        assert f"<b>{ALARMS['camera_lost'].number}</b>".encode() in body
 
 
 def test_a_fruit_that_was_never_judged_has_a_page_too(pages, tmp_path):

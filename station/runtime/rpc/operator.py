@@ -6,11 +6,8 @@ import time
 
 from station.channel.line import Noted
 from station.channel.panel_live import (
-    AlarmChange,
-    AlarmHistory,
     DeviceView,
     Fruit,
-    GetAlarmHistory,
     GetFruit,
     GetPanelState,
     GetPicture,
@@ -27,10 +24,9 @@ from station.channel.panel_live import (
     RecipeSummary,
 )
 from station.channel.server import Handlers
-from station.inspection.alarm_table import ALARMS
 from station.inspection.states import STATES
 from station.messages import operation as messages
-from station.messages.message import Message, message_in, message_of, verbatim
+from station.messages.message import Message, message_of
 from station.records.audit import AuditEntry
 from station.records.errors import RecordsError
 from station.records.records import Records
@@ -48,7 +44,6 @@ from station.vocabulary import Refusal
 
 log = logging.getLogger(__name__)
 
-_ALARM_ROWS = {str(alarm): row for alarm, row in ALARMS.items()}
 SILENT_S = 3.0
 """Time for a killed HMI process to restart, on a machine that is otherwise idle."""
 
@@ -59,7 +54,7 @@ class PanelServer:
     Args:
         configuration: in force.
         production: what is shown and commanded.
-        records: gets lots; read for alarms.
+        records: gets lots.
         alarms: alarm commands of people.
         audit: gets what people do.
     """
@@ -91,7 +86,6 @@ class PanelServer:
             GetFruit: self._fruit,
             GetPicture: self._picture,
             GetRecipes: self._recipes,
-            GetAlarmHistory: self._alarm_history,
             OperatorCommand: self._order,
             PersonNoted: self._person,
             **alarms.handlers,
@@ -177,22 +171,6 @@ class PanelServer:
             recipes=tuple(_recipe_view(each) for each in found),
             active=None if active is None else _recipe_view(active),
             problems=self._book.problems,
-        )
-
-    async def _alarm_history(self, request: GetAlarmHistory) -> AlarmHistory:
-        rows = await self._records.alarm_log(request.most)
-        return AlarmHistory(
-            changes=tuple(
-                AlarmChange(
-                    utc_ms=row.utc_ms,
-                    id=row.id,
-                    number=known.number if (known := _ALARM_ROWS.get(row.id)) else None,
-                    cause=known.cause if known else verbatim(row.id),
-                    change=row.change,
-                    detail=message_in(row.detail),
-                )
-                for row in rows
-            )
         )
 
     async def _order(self, request: OperatorCommand) -> OperatorCommandView:
