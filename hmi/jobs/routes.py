@@ -1,17 +1,16 @@
 """Job pages: progress and files of exports, reports and what-ifs."""
 
-from collections.abc import AsyncIterator
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Request
 from pydantic import StringConstraints
-from starlette.responses import Response, StreamingResponse
+from starlette.responses import FileResponse, Response
 
 from hmi.web.access import GenuineCaller, HmiNow, LocaleNow, caller_of
 from hmi.web.context import Hmi
 from hmi.web.page import go_to, show
 from hmi.web.problem import Problem
-from station.channel.panel_queries import Chunk, EndJob, GetJob, JobView, ReadJobFile
+from station.channel.panel_queries import EndJob, GetJob, JobView
 
 router = APIRouter(prefix="/jobs")
 DEADLINE_S = 20.0
@@ -70,21 +69,8 @@ async def display(hmi: HmiNow, job: JobId, name: FileName) -> Response:
 
 
 async def _sent(hmi: Hmi, job: str, name: str, headers: dict[str, str]) -> Response:
-    """Send a file in pieces; each is fetched after the browser has taken the one before."""
     reply = await hmi.gateway.request(GetJob(job=job), JobView, deadline_s=DEADLINE_S)
     found = next((each for each in reply.files if each.name == name), None)
     if found is None:
         raise Problem(404, "problem.not_found")
-
-    async def pieces() -> AsyncIterator[bytes]:
-        offset = 0
-        while offset < found.size_bytes:
-            query = ReadJobFile(job=job, name=name, offset=offset)
-            chunk = await hmi.gateway.request(query, Chunk, deadline_s=DEADLINE_S)
-            if not chunk.data:
-                raise Problem(409, "problem.refused")
-            offset += len(chunk.data)
-            yield chunk.data
-
-    length = {"content-length": str(found.size_bytes)}
-    return StreamingResponse(pieces(), media_type=found.media_type, headers={**headers, **length})
+    return FileResponse(found.path, media_type=found.media_type, headers=headers)

@@ -5,11 +5,12 @@ import re
 import time
 from collections import OrderedDict
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Form, Query, Request
 from pydantic import StringConstraints
-from starlette.responses import Response
+from starlette.responses import FileResponse, Response
 
 from hmi.maintenance.histogram import histogram
 from hmi.web.access import HmiNow, LocaleNow, may, orders
@@ -36,7 +37,6 @@ from station.channel.panel_maintenance_queries import (
     ContinueCalibrationRun,
     EndCalibrationRun,
     GetCalibration,
-    GetCalibrationPicture,
     GetHealth,
     GetLiveImage,
     GetRegisters,
@@ -199,11 +199,14 @@ async def sensor_part(hmi: HmiNow, locale: LocaleNow) -> Response:
 async def sensor_picture(
     hmi: HmiNow,
     kind: Literal["calibration", "verification"],
-    name: Literal["area.png", "field.png", "reference.png"],
+    name: Literal["area.png", "field.png"],
 ) -> Response:
     """Send a plot of the calibration in force."""
-    reply = await hmi.gateway.request(GetCalibrationPicture(kind=kind, name=name), Picture, deadline_s=DEADLINE_S)
-    return Response(reply.data, media_type=reply.media_type)
+    reply = await hmi.gateway.request(GetCalibration(), CalibrationState, deadline_s=DEADLINE_S)
+    record = reply.calibration if kind == "calibration" else reply.verification
+    if record is None or name not in record.pictures:
+        raise Problem(404, "problem.not_found")
+    return FileResponse(Path(record.folder) / name)
 
 
 @router.post("/sensor/begin")

@@ -150,8 +150,10 @@ class CalibrationView(ChannelMessage):
     """Its result in one line."""
     passed: bool
     checks: tuple[CheckView, ...]
+    folder: str
+    """Where its files are."""
     pictures: tuple[str, ...]
-    """Names of its plots, for `GetCalibrationPicture`."""
+    """Names of its plots there."""
 
 
 class RunStep(ChannelMessage):
@@ -194,14 +196,6 @@ class CalibrationState(ChannelMessage):
     run: CalibrationRunView | None
     run_refused: Message | None
     """Why no run can start now."""
-
-
-class GetCalibrationPicture(ChannelMessage):
-    """Query a plot of a calibration or verification. Answered with `Picture`."""
-
-    purpose: ClassVar[str] = "for a calibration's plot"
-    kind: Literal["calibration", "verification"]
-    name: str = Field(pattern=r"^(area|field|reference)\.png$")
 
 
 class StartCalibrationRun(ChannelMessage):

@@ -1,7 +1,6 @@
 """Orders of the operators' pages on the records: lots, exports, reports; and their jobs.
 
-Every answer is bounded: lists come a page at a time, files piece by piece. A long operation is a job: it is started,
-polled, and its files are then read.
+A long operation is a job: it is started and polled, and the pages then send its files.
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -14,8 +13,6 @@ from station.messages.message import Message
 from station.vocabulary import OutcomeName, Reason
 
 LARGEST_PAGE = 100
-LARGEST_CHUNK_BYTES = 4 * 1024 * 1024
-"""Of a file, before it is written as base64: well below the channel's largest message."""
 
 Sequence = Annotated[int, Field(ge=1, lt=2**32)]
 Text = Annotated[str, Field(max_length=64)]
@@ -105,6 +102,7 @@ class EndJob(ChannelMessage):
 class JobFile(ChannelMessage):
     """A file that a job has written."""
 
+    path: str
     name: str
     size_bytes: int
     media_type: str
@@ -123,21 +121,3 @@ class JobView(ChannelMessage):
     """Why it failed: a limit of the queue, or the command's last output."""
     files: tuple[JobFile, ...]
     """Once it is done."""
-
-
-class ReadJobFile(ChannelMessage):
-    """A piece of a file of a job that is done."""
-
-    purpose: ClassVar[str] = "for a job's file"
-    job: str = Field(pattern=r"^[0-9a-f]{32}$")
-    name: str = Field(pattern=r"^[A-Za-z0-9_.-]{1,64}$")
-    offset: int = Field(default=0, ge=0, lt=2**50)
-
-
-class Chunk(ChannelMessage):
-    """A piece of a file; empty at its end."""
-
-    model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
-    data: bytes
-    size_bytes: int
-    """Of the whole file."""

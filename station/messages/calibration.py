@@ -293,5 +293,3 @@ CALLED_OFF = define("calibration.called_off", "called off: nothing was stored")
 BALL_LATE = define(
     "calibration.ball_late", "nobody laid the ball within {limit_min} min; begin again", limit_min=Number()
 )
-NO_PLOT = define("calibration.no_plot", "there is no calibration or verification of this sensor yet")
-PLOT_UNREADABLE = define("calibration.plot_unreadable", "{file}: {error}", file=Name(), error=Name())

@@ -13,10 +13,6 @@ NO_FOLDER = define("job.no_folder", "{folder}: {error}; make it writable", folde
 DISK_FULL = define(
     "job.disk_full", "{free_mb} MB are free on the disk of {folder}; free space first", free_mb=Number(0), folder=Name()
 )
-NO_FILE = define("job.no_file", "there is no file {name} of this job; begin it again", name=Name())
-FILE_UNREADABLE = define(
-    "job.file_unreadable", "{name} cannot be read: {error}; begin the job again", name=Name(), error=Name()
-)
 UNKNOWN = define("job.unknown", "this job is not known any more; begin it again")
 LATE = define("job.late", "it was not done within {limit_min} min; ask for less", limit_min=Number())
 NOT_STARTED = define("job.not_started", "it could not be started: {error}", error=Name())

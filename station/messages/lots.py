@@ -12,4 +12,3 @@ BAD_NAME = define(
     longest=Number(),
 )
 NONE = define("lot.none", "no lot was started at the panel")
-UNPRINTABLE = define("lot.unprintable", "{name} is no lot's name: expected printable letters", name=Name())

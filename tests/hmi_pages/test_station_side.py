@@ -43,20 +43,14 @@ def with_jobs(home: Path, code: str, work: Callable[[PanelJobs], Any]) -> None:
     asyncio.run(run())
 
 
-def test_a_jobs_file_is_read_piece_by_piece_and_nothing_else_is(tmp_path: Path) -> None:
+def test_a_jobs_file_is_named_with_its_place_and_no_other_is(tmp_path: Path) -> None:
     async def work(jobs: PanelJobs) -> None:
         folder = jobs.folder()
         job = jobs.begin("export", folder, [str(folder)]).job
         told = await until(jobs, job, lambda told: told.state == "done")
         assert [(file.name, file.size_bytes) for file in told.files] == [("inspections.csv", 5_000_000)]
-        first = jobs.read(job, "inspections.csv", 0)
-        second = jobs.read(job, "inspections.csv", len(first.data))
-        assert len(first.data) + len(second.data) == first.size_bytes == 5_000_000
-        assert jobs.read(job, "inspections.csv", 5_000_000).data == b""
         (folder / "secret").write_text("x")
-        for name in ("secret", "../inspections.csv", "/etc/passwd"):
-            with pytest.raises(JobError):
-                jobs.read(job, name, 0)
+        assert [file.path for file in jobs.state(job).files] == [str(folder / "inspections.csv")]
 
     with_jobs(tmp_path, WRITE, work)
 

@@ -24,11 +24,9 @@ from station.channel.panel_maintenance_queries import (
     ContinueCalibrationRun,
     EndCalibrationRun,
     GetCalibration,
-    GetCalibrationPicture,
     RunStep,
     StartCalibrationRun,
 )
-from station.channel.panel_queries import Picture
 from station.channel.server import Handler
 from station.channel.worker import PanelWorker
 from station.errors import BadInputError, StationError
@@ -96,7 +94,6 @@ class PanelCalibration:
         """Return the handler of each request."""
         return {
             GetCalibration: self.state,
-            GetCalibrationPicture: self.picture,
             StartCalibrationRun: self.begin,
             ContinueCalibrationRun: self.go_on,
             EndCalibrationRun: self.end,
@@ -132,25 +129,6 @@ class PanelCalibration:
             run=None if self._run is None else _run_view(self._run),
             run_refused=self._why_not(serial),
         )
-
-    async def picture(self, request: GetCalibrationPicture) -> Picture:
-        """Return a plot of the calibration in force."""
-
-        def read() -> Picture:
-            calibration = self._devices.calibration.calibration
-            record: Calibration | Verification | None = calibration
-            if calibration is not None and request.kind == "verification":
-                record = self._store.last_verification(calibration)
-            if record is None:
-                raise BadInputError(messages.NO_PLOT())
-            try:
-                return Picture(media_type="image/png", data=(self._store.folder(record) / request.name).read_bytes())
-            except OSError as error:
-                raise BadInputError(
-                    messages.PLOT_UNREADABLE(file=f"{record.id}/{request.name}", error=str(error.strerror))
-                ) from error
-
-        return await self._worker.do(read)
 
     async def begin(self, request: StartCalibrationRun) -> CalibrationRunView:
         """Start a run; the gripper closes on the ball."""
@@ -291,6 +269,7 @@ class PanelCalibration:
             words=made.summary(),
             passed=True,
             checks=_check_views(made),
+            folder=str(self._store.folder(made).absolute()),
             pictures=_files_in(self._store.folder(made)),
         )
 
@@ -304,6 +283,7 @@ class PanelCalibration:
             words=ratio,
             passed=made.passed,
             checks=_check_views(made),
+            folder=str(self._store.folder(made).absolute()),
             pictures=_files_in(self._store.folder(made)),
         )
 

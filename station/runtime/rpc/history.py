@@ -4,13 +4,11 @@ from datetime import UTC, datetime
 
 from station.channel.messages import ChannelMessage
 from station.channel.panel_queries import (
-    Chunk,
     EndJob,
     EndLot,
     GetJob,
     JobView,
     LotView,
-    ReadJobFile,
     Search,
     StartExport,
     StartLot,
@@ -46,7 +44,6 @@ class PanelHistory:
             StartLotReport: self.start_report,
             GetJob: self.job,
             EndJob: self.end_job,
-            ReadJobFile: self.read_file,
         }
 
     async def start_lot(self, request: StartLot) -> LotView:
@@ -82,10 +79,6 @@ class PanelHistory:
     async def end_job(self, request: EndJob) -> JobView:
         """Cancel a job."""
         return await self._jobs.end(request.job)
-
-    async def read_file(self, request: ReadJobFile) -> Chunk:
-        """Return a part of a job's file."""
-        return await self._worker.do(lambda: self._jobs.read(request.job, request.name, request.offset))
 
     async def _note(self, request: StartLot | EndLot | StartExport, action: str, new: object) -> None:
         subject = "records" if isinstance(request, StartExport) else f"lot {request.name}"

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from station.channel.panel_queries import LARGEST_CHUNK_BYTES, Chunk, JobFile, JobView
+from station.channel.panel_queries import JobFile, JobView
 from station.errors import StationError
 from station.messages import jobs as messages
 from station.messages.message import Message, verbatim
@@ -120,7 +120,12 @@ class PanelJobs:
         """
         job = self._get(job_id)
         files = tuple(
-            JobFile(name=path.name, size_bytes=path.stat().st_size, media_type=_MEDIA[path.suffix])
+            JobFile(
+                path=str(path.absolute()),
+                name=path.name,
+                size_bytes=path.stat().st_size,
+                media_type=_MEDIA[path.suffix],
+            )
             for path in sorted(job.folder.iterdir() if job.state == "done" else ())
             if path.suffix in _MEDIA
         )
@@ -133,27 +138,6 @@ class PanelJobs:
             message=job.message,
             files=files,
         )
-
-    def read(self, job_id: str, name: str, offset: int) -> Chunk:
-        """Return a part of a job's file. Blocks.
-
-        Args:
-            job_id: of a finished job.
-            offset: bytes from the file's start.
-
-        Raises:
-            JobError: there is no such file.
-        """
-        told = self.state(job_id)
-        if name not in {file.name for file in told.files}:
-            raise JobError(messages.NO_FILE(name=name))
-        try:
-            with (self._get(job_id).folder / name).open("rb") as file:
-                size_bytes = file.seek(0, os.SEEK_END)
-                file.seek(min(offset, size_bytes))
-                return Chunk(data=file.read(LARGEST_CHUNK_BYTES), size_bytes=size_bytes)
-        except OSError as error:
-            raise JobError(messages.FILE_UNREADABLE(name=name, error=str(error.strerror))) from error
 
     async def end(self, job_id: str) -> JobView:
         """Cancel a job. Idempotent."""
