@@ -5,13 +5,10 @@ names of types are in quotes, parameters of `SHL` and `SHR` have names, the time
 """
 
 import re
-from pathlib import Path
-
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
 from plc_interface.registers.generate.st_source import Variable, parts
-from plc_interface.registers.generate.structured_text import ARRAYS, data_types, function_block
+from plc_interface.registers.generate.structured_text import ARRAYS, TEMPLATES, data_types, function_block
 from plc_interface.registers.map import GROUP_BY_NAME
 
 _WORDS = re.compile(r"\(\*.*?\*\)|[A-Za-z_][\w#]*(?:\.\w+)*|\d[\w#]*|.", re.DOTALL)
@@ -22,20 +19,12 @@ _TIMER = "{InstructionName := 'TON_TIME'; LibVersion := '1.0'} : TON_TIME"
 
 def s7_1500() -> str:
     """The file `s7-1500.scl`."""
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "templates"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,  # noqa: S701 (SCL, not HTML)
-    )
     source = parts(function_block())
     sections = {
         section: [_declaration(each) for each in source.variables if each.section == section]
         for section in ("VAR_INPUT", "VAR_OUTPUT", "VAR", "VAR CONSTANT")
     }
-    return environment.get_template("s7_1500.scl.j2").render(
+    return TEMPLATES.get_template("s7_1500.scl.j2").render(
         made_by=f"{MADE_BY} {UNTESTED}",
         types=_types(),
         sections=sections,

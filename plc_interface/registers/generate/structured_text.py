@@ -57,6 +57,16 @@ def members(registers: tuple[Register, ...]) -> Iterator[tuple[str, str, str]]:
             yield flag, "BOOL", meaning
 
 
+TEMPLATES = Environment(
+    loader=FileSystemLoader(Path(__file__).parent / "templates"),
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+    autoescape=False,  # noqa: S701 (no HTML)
+)
+
+
 def data_types() -> str:
     """The file with the data types of status and result, and of the words read and written."""
     parts = [_head("Data types")]
@@ -92,15 +102,7 @@ def _head(what: str) -> str:
 
 
 def _render(template: str, what: str) -> str:
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "templates"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,  # noqa: S701 (Structured Text, not HTML)
-    )
-    return environment.get_template(template).render(
+    return TEMPLATES.get_template(template).render(
         head=_head(what),
         first=STATUS.address,
         last=MORE_STATUS.address + MORE_STATUS.words - 1,

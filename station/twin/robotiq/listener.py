@@ -1,19 +1,17 @@
 """A TCP door of the twin that comes and goes with the gripper's faults."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from abc import ABC, abstractmethod
 from contextlib import suppress
 
-from station.twin.clock import Clock
 from station.twin.faults import CommonFault, FaultBoard
 from station.twin.robotiq.faults import gone
+from station.twin.robotiq.model import RobotiqGripper
 
 GARBAGE = bytes.fromhex("ff00a55a0df3c3e1fe0a")
 """What `garbage` answers: neither text nor a frame with a right CRC."""
 _WATCH_S = 0.02
 _LATEST_S = 60.0
-
-Session = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 
 
 async def disturbed(answer: bytes, faults: FaultBoard) -> bytes:
@@ -27,16 +25,14 @@ async def disturbed(answer: bytes, faults: FaultBoard) -> bytes:
     return GARBAGE if faults.active(CommonFault.GARBAGE) else answer
 
 
-class Listener:
+class Listener(ABC):
     """Listens on one address, runs a session for each connection, and is not there while the gripper is gone."""
 
-    def __init__(self, host: str, port: int, session: Session, clock: Clock, faults: FaultBoard) -> None:
+    def __init__(self, gripper: RobotiqGripper, host: str, port: int) -> None:
         self.host = host
         self.port = port
         """The port listened on; where 0 was asked for, the one that was found at `start`."""
-        self._session = session
-        self._clock = clock
-        self._faults = faults
+        self._gripper = gripper
         self._server: asyncio.Server | None = None
         self._watcher: asyncio.Task[None] | None = None
         self._sessions: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
@@ -59,9 +55,13 @@ class Listener:
             self._watcher = None
         await self._close()
 
+    @abstractmethod
+    async def _session(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Answer one client."""
+
     async def _watch(self) -> None:
         while True:
-            away = gone(self._faults, self._clock)
+            away = gone(self._gripper.faults, self._gripper.clock)
             if away and self._server:
                 await self._close()
             elif not away and not self._server:

@@ -19,34 +19,11 @@ PORT = 54321
 """The port of the RS-485 URCap."""
 
 
-class RtuOverTcpServer:
+class RtuOverTcpServer(Listener):
     """RTU frames over TCP, any number of clients."""
 
     def __init__(self, gripper: RobotiqGripper, host: str = "127.0.0.1", port: int = PORT) -> None:
-        self._gripper = gripper
-        self._listener = Listener(host, port, self._session, gripper.clock, gripper.faults)
-
-    @property
-    def host(self) -> str:
-        """The address listened on."""
-        return self._listener.host
-
-    @property
-    def port(self) -> int:
-        """The port listened on, once started."""
-        return self._listener.port
-
-    async def start(self) -> None:
-        """Listen.
-
-        Raises:
-            OSError: the address cannot be had.
-        """
-        await self._listener.start()
-
-    async def stop(self) -> None:
-        """Close every connection and stop listening."""
-        await self._listener.stop()
+        super().__init__(gripper, host, port)
 
     async def _session(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         framer = RequestFramer()
