@@ -14,7 +14,7 @@ from station.analysis.measurement import Measured, Refused, measure_all
 from station.analysis.output import OutputFolder, flag_names
 from station.analysis.pictures import outlined, sheet, stacked, thumbnail
 from station.analysis.presses import Run, runs, singles
-from station.analysis.report import Report, ReportRow, data_uri, render
+from station.analysis.report import Report, ReportRow, jpeg_uri, render
 from station.analysis.sources import Source
 from station.calibration.model import Calibration
 from station.charts.area_chart import document
@@ -152,7 +152,7 @@ def _summary(item: Measured, scale: Scale, widths_mm: dict[str, float] | None) -
     return _Summary(
         row=ReportRow(
             image=name,
-            picture=data_uri(picture),
+            picture=jpeg_uri(picture),
             mask=f"masks/{item.source.stem}.png",
             contact=contact.found,
             area_px=contact.area_px,
@@ -198,7 +198,7 @@ def _write_summaries(
     staged = [(item.row.image, list(item.stages.values())) for item in measured if item.stages]
     for name, picture in _pages("stages", staged, 1, tuple(measured[0].stages)):
         output.write_picture(name, picture)
-        stages_pictures.append((name, data_uri(picture)))
+        stages_pictures.append((name, jpeg_uri(picture)))
     qualities = [(item.row.image, item.quality) for item in measured if item.quality is not None]
     if qualities:
         output.write_denoising(qualities)

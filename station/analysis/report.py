@@ -1,14 +1,13 @@
 """Analysis report: one HTML file with its pictures inside."""
 
-import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
-import jinja2
 from markupsafe import Markup
 
 from station.charts.area_chart import style
+from station.charts.report import data_uri, templates
 from station.vision.contact import Image
 
 _JPEG_QUALITY = 88
@@ -57,21 +56,14 @@ class Report:
 
 def render(report: Report) -> str:
     """Make an HTML document that needs no network and no other file."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("station.analysis", "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("report.html.j2").render(report=report, chart_style=style())
+    return templates("station.analysis").get_template("report.html.j2").render(report=report, chart_style=style())
 
 
-def data_uri(picture: Image) -> str:
+def jpeg_uri(picture: Image) -> str:
     """Return a picture as the data URI of a JPEG.
 
     Args:
         picture: shape (height, width, 3), dtype uint8.
     """
     data = cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY))[1].tobytes()
-    return "data:image/jpeg;base64," + base64.b64encode(data).decode()
+    return data_uri(data)

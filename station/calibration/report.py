@@ -1,15 +1,13 @@
 """Report of a calibration or a verification, and the files that are stored with it."""
 
-import base64
-
 import cv2
-import jinja2
 
 from station.calibration.calibration_procedure import Draft, Evidence
 from station.calibration.model import Calibration, Refusal
 from station.calibration.plots import area_plot, field_plot
 from station.calibration.store import PAGE, REFERENCE, press_name
 from station.calibration.verification_procedure import VerificationResult, outlined
+from station.charts.report import data_uri, templates
 from station.vision.contact import Image
 
 _TILE_PX = 220
@@ -30,8 +28,8 @@ def calibration_files(draft: Draft) -> dict[str, bytes]:
         facts=_calibration_facts(calibration),
         checks=[(check, None) for check in calibration.checks],
         plots=[
-            ("The ball's area over the width", _uri(area)),
-            ("Light and noise over the field, as the image shows it", _uri(field)),
+            ("The ball's area over the width", data_uri(area)),
+            ("Light and noise over the field, as the image shows it", data_uri(field)),
         ],
         tiles=[("untouched", "reference", _tile(draft.reference)), *tiles],
     )
@@ -60,8 +58,8 @@ def verification_files(verified: VerificationResult, calibration: Calibration) -
             ("Operator", verification.operator or "not told"),
             ("Made", f"{verification.made_at:%Y-%m-%d %H:%M:%S} UTC"),
         ],
-        checks=[(check, _uri(pictures[check.picture]) if check.picture else None) for check in verification.checks],
-        plots=[("The ball's area over the width", _uri(area))],
+        checks=[(check, data_uri(pictures[check.picture]) if check.picture else None) for check in verification.checks],
+        plots=[("The ball's area over the width", data_uri(area))],
         tiles=[("untouched", "now", _tile(verified.reference)), *tiles],
     )
     return {REFERENCE: png(verified.reference), "area.png": area, **pictures, PAGE: page}
@@ -130,21 +128,10 @@ def _area(calibration: Calibration, area_px: int) -> str:
 
 
 def _page(**values: object) -> bytes:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("station.calibration", "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("report.html.j2").render(**values).encode()
+    return templates("station.calibration").get_template("report.html.j2").render(**values).encode()
 
 
 def _tile(picture: Image) -> str:
     height, width = picture.shape[:2]
     small = cv2.resize(picture, (_TILE_PX, round(_TILE_PX * height / width)), interpolation=cv2.INTER_AREA)
-    return _uri(cv2.imencode(".jpg", small)[1].tobytes(), "jpeg")
-
-
-def _uri(data: bytes, kind: str = "png") -> str:
-    return f"data:image/{kind};base64," + base64.b64encode(data).decode()
+    return data_uri(cv2.imencode(".jpg", small)[1].tobytes())

@@ -1,15 +1,14 @@
 """Lot report for people: one HTML file, laid out for the screen and for A4."""
 
-import base64
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
 import cv2
-import jinja2
 
 from station.charts.area_chart import report_style
 from station.charts.area_histogram import area_histogram
+from station.charts.report import data_uri, templates
 from station.charts.spark import spark
 from station.records.clock import utc_ms
 from station.records.lot_summary import Example, LotSummary
@@ -38,13 +37,7 @@ def html_report(lot: LotSummary, station: str) -> str:
     Args:
         station: its name; on each printed page beside the lot's.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("station.records", "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = templates("station.records")
     environment.filters["time"] = _time
     environment.filters["css"] = _css
     examples = [(example, _data_uri(example), spark(example.areas_mm2, 200, 44)) for example in lot.examples]
@@ -71,7 +64,7 @@ def _data_uri(example: Example) -> str:
     share = _PICTURE_PX / max(picture.shape[:2])
     small = cv2.resize(picture, None, fx=share, fy=share, interpolation=cv2.INTER_AREA) if share < 1 else picture
     data = cv2.imencode(".jpg", small, (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY))[1].tobytes()
-    return "data:image/jpeg;base64," + base64.b64encode(data).decode()
+    return data_uri(data)
 
 
 def _time(utc_milliseconds: int) -> str:

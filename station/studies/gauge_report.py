@@ -1,9 +1,10 @@
 """Report of a gauge study: one HTML file with its plots inside."""
 
+from station.charts.report import data_uri, templates
 from station.studies.gauge import Gauge
 from station.studies.gauge_figures import components_plot, measurements_plot
 from station.studies.grr import GaugeStudy
-from station.studies.report import data_uri, environment, share
+from station.studies.report import share
 
 _MEANINGS = {
     "EV": "repeatability (equipment)",
@@ -48,7 +49,7 @@ def render(study: GaugeStudy) -> str:
         }
         for one in agreed.operators
     ]  # fmt: skip
-    return environment().get_template("grr.html.j2").render(
+    return templates("station.studies").get_template("grr.html.j2").render(
         study=study,
         gauge=gauge,
         meanings=_MEANINGS,

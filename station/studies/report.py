@@ -1,11 +1,9 @@
 """Study report: one HTML file with its figures inside."""
 
-import base64
 from collections.abc import Sequence
 from importlib.metadata import version
 
-import jinja2
-
+from station.charts.report import data_uri, templates
 from station.studies import figures
 from station.studies.cohort import PAPER_FAILURES
 from station.studies.failure import DEFINITION, Cause, image_at, interval
@@ -15,27 +13,6 @@ from station.studies.study import Study, summary
 from station.twin.gel import MM_PER_PX
 
 PAPER_SAMPLES = 30
-
-
-def environment() -> jinja2.Environment:
-    """Return the environment of this package's templates."""
-    return jinja2.Environment(
-        loader=jinja2.PackageLoader("station.studies", "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-
-
-def data_uri(picture: bytes) -> str:
-    """Return a picture as a data URI.
-
-    Args:
-        picture: the content of a PNG or a JPEG.
-    """
-    kind = "png" if picture.startswith(b"\x89PNG") else "jpeg"
-    return f"data:image/{kind};base64," + base64.b64encode(picture).decode()
 
 
 def share(count: int, of: int) -> str:
@@ -59,7 +36,7 @@ def write_report(study: Study) -> None:
     request = study.request
     identity = identity_of(Task(request.fruit, request.method, request.seed, 1))
     page = (
-        environment()
+        templates("station.studies")
         .get_template("study.html.j2")
         .render(
             title=f"{request.fruit.replace('_', ' ').capitalize()}, {request.method}: {len(study.samples)} samples",

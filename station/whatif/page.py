@@ -1,19 +1,18 @@
 """Report of a what-if: one HTML file with its pictures inside, readable without network and station."""
 
-import base64
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
-import jinja2
 import numpy as np
 from markupsafe import Markup
 from sqlalchemy import Connection
 
 from station.calibration.gate import gated
 from station.charts.area_chart import Curve, Limit, Size, Texts, area_chart, report_style
+from station.charts.report import data_uri, templates
 from station.recipe_store.difference import Difference
 from station.records.images import image_path
 from station.settings.recipe_model import Recipe
@@ -60,14 +59,7 @@ class Page:
 
 def render(page: Page) -> str:
     """Make the HTML document."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("station.whatif", "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    template = environment.get_template("whatif.html.j2")
+    template = templates("station.whatif").get_template("whatif.html.j2")
     return template.render(page=page, before=BEFORE, after=AFTER, report_style=report_style())
 
 
@@ -126,7 +118,7 @@ def _picture(connection: Connection, folder: Path, sequence: int, draft: Segment
     scale = _PICTURE_PX / image.shape[0]
     small = cv2.resize(image, (round(scale * image.shape[1]), _PICTURE_PX), interpolation=cv2.INTER_AREA)
     data = cv2.imencode(".jpg", small, (cv2.IMWRITE_JPEG_QUALITY, 85))[1].tobytes()
-    return "data:image/jpeg;base64," + base64.b64encode(data).decode()
+    return data_uri(data)
 
 
 def _followed(

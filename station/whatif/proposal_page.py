@@ -1,6 +1,5 @@
 """Report of a proposed limit: sentences, histogram of good and bad fruit, both errors over the limit."""
 
-import base64
 import io
 from collections.abc import Sequence
 from typing import Any
@@ -10,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from station.charts.area_chart import report_style
+from station.charts.report import data_uri
 from station.whatif.proposal import Proposal
 
 _PAGE = """<!doctype html>
@@ -145,4 +145,4 @@ def _errors(best: Proposal, curve: Sequence[dict[str, Any]]) -> str:
 def _data_uri(figure: Figure) -> str:
     data = io.BytesIO()
     figure.savefig(data, format="png", dpi=110)
-    return "data:image/png;base64," + base64.b64encode(data.getvalue()).decode()
+    return data_uri(data.getvalue())
