@@ -269,7 +269,6 @@ class Fruit(ChannelMessage):
     onset_mm: float | None
     curve: tuple[CurvePointSummary, ...]
     limits: tuple[LimitView, ...]
-    early_stop_mm2: float
     growth_mm2_per_mm: float
     """The largest of a good fruit."""
     deadline_s: float

@@ -50,7 +50,6 @@ class Health(ChannelMessage):
     parts: tuple[PartHealth, ...]
     devices: dict[str, str]
     versions: dict[str, str]
-    progress_age_s: dict[str, float]
     records: dict[str, int]
     """Bytes and counts of the records."""
     records_error: Message | None

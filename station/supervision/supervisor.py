@@ -154,11 +154,6 @@ class Supervisor:
         self._restarts_file = Path()
         self._fed_s = 0.0
 
-    @property
-    def restarts(self) -> dict[str, int]:
-        """Return the restarts of each program, within the budget's time."""
-        return {child.program.name: len(child.restarts) for child in self._children}
-
     def ready(self, name: str) -> bool:
         """Return whether a program's present process has reported that it serves.
 

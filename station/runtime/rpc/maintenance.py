@@ -68,7 +68,7 @@ class PanelMaintenance:
 
     Args:
         production: what is moved, watched and shown.
-        observability: the progress of tasks; gets every manual motion.
+        observability: gets every manual motion.
         home: folder of the golden reference of a sensor that is not calibrated.
         worker: makes pictures in its thread.
         log: the last lines.
@@ -84,8 +84,8 @@ class PanelMaintenance:
     ) -> None:
         self._service, self._devices, self._interlock = production.service, production.devices, production.interlock
         self._plc_commands, self._home = production.plc_commands, home
-        self._liveness, self._audit = observability.liveness, observability.audit
-        self._worker, self._log, self._versions = worker, log, dict(observability.versions)
+        self._audit, self._versions = observability.audit, dict(observability.versions)
+        self._worker, self._log = worker, log
         self._moving = asyncio.Lock()
         self._method: tuple[object, Method] | None = None
 
@@ -137,7 +137,6 @@ class PanelMaintenance:
             ),
             devices=self._devices.names,
             versions=self._versions,
-            progress_age_s=self._liveness.ages_s(),
             records={
                 "database_bytes": status.database_bytes,
                 "image_bytes": status.image_bytes,

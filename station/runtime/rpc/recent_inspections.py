@@ -188,7 +188,6 @@ def fruit_view(
             )
             for each in recipe.damage.area
         ),
-        early_stop_mm2=factor * recipe.early_stop.area_mm2,
         growth_mm2_per_mm=factor * recipe.damage.growth_mm2_per_mm,
         deadline_s=deadline_s,
         phases_s=dict(record.phases_s),
