@@ -13,6 +13,7 @@ from starlette.responses import Response
 from hmi.common.charts import area_over_closing, mark_decided
 from hmi.history.audit_sentences import sentence
 from hmi.history.chips import chips, days
+from hmi.history.export_options import check_text, options_of
 from hmi.past.past import FullRecord, Page, Stages, judged_of
 from hmi.web.access import GenuineCaller, HmiNow, LocaleNow, caller_of
 from hmi.web.context import Hmi
@@ -22,8 +23,9 @@ from hmi.web.page import go_to, show
 from hmi.web.problem import Problem
 from hmi.web.sessions import Caller
 from hmi.web.translation import Locale
+from station.channel.line import Noted
 from station.channel.panel import Actor
-from station.channel.panel_queries import JobView, Search, StartExport, StartLotReport
+from station.channel.panel_queries import NoteExport, Search
 from station.charts.area_chart import Curve, Limit, Mark
 from station.charts.spark import spark
 from station.messages.reasons import reason_message
@@ -124,17 +126,20 @@ async def export(
     wanted = search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
     if wanted is None:
         raise Problem(400, "problem.bad_form")
-    query = StartExport(search=wanted, form=form, actor=_actor(caller))
-    job = await hmi.gateway.request(query, JobView, deadline_s=DEADLINE_S)
-    return go_to(f"/jobs/{job.job}?back=/history")
+    actor, options, folder = _actor(caller), options_of(wanted), hmi.jobs.folder()
+    await hmi.gateway.request(NoteExport(search=wanted, actor=actor), Noted, deadline_s=DEADLINE_S)
+    job = hmi.jobs.begin("export", folder, ["records", "export", str(folder / f"inspections.{form}"), *options])
+    return go_to(f"/jobs/{job.id}?back=/history")
 
 
 @router.post("/report")
 async def report(hmi: HmiNow, caller: GenuineCaller, lot: Annotated[str, Form(max_length=32)]) -> Response:
     """Start a lot's report."""
-    query = StartLotReport(lot=lot, actor=_actor(caller))
-    job = await hmi.gateway.request(query, JobView, deadline_s=DEADLINE_S)
-    return go_to(f"/jobs/{job.job}?back=/history")
+    _actor(caller)
+    check_text(lot)
+    folder = hmi.jobs.folder()
+    job = hmi.jobs.begin("lot_report", folder, ["records", "report", "--", lot, str(folder / "lot.html")])
+    return go_to(f"/jobs/{job.id}?back=/history")
 
 
 @router.get("/audit")

@@ -10,10 +10,8 @@ from hmi.web.access import GenuineCaller, HmiNow, LocaleNow, caller_of
 from hmi.web.context import Hmi
 from hmi.web.page import go_to, show
 from hmi.web.problem import Problem
-from station.channel.panel_queries import EndJob, GetJob, JobView
 
 router = APIRouter(prefix="/jobs")
-DEADLINE_S = 20.0
 SHOWN_POLICY = "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
 """For a document that a job has written: it runs nothing, and fetches nothing."""
 
@@ -31,18 +29,15 @@ async def logged_in(request: Request) -> None:
 @router.get("/{job}")
 async def job(request: Request, hmi: HmiNow, job: JobId, back: Back = "/history") -> Response:
     """Show a job."""
-    reply = await hmi.gateway.request(GetJob(job=job), JobView, deadline_s=DEADLINE_S)
-    return show(request, "job.html.j2", job=reply, back=back)
+    return show(request, "job.html.j2", job=hmi.jobs.get(job), back=back)
 
 
 @router.get("/{job}/part")
 async def part(hmi: HmiNow, locale: LocaleNow, job: JobId) -> Response:
     """Render the same as a part of the page, for polling."""
-    reply = await hmi.gateway.request(GetJob(job=job), JobView, deadline_s=DEADLINE_S)
-    html = hmi.renderer.render("job_part.html.j2", locale, {"job": reply})
-    return Response(
-        html, media_type="text/html", headers={"x-over": "" if reply.state in {"waiting", "running"} else "1"}
-    )
+    found = hmi.jobs.get(job)
+    html = hmi.renderer.render("job_part.html.j2", locale, {"job": found})
+    return Response(html, media_type="text/html", headers={"x-over": "" if found.open else "1"})
 
 
 @router.post("/{job}/end")
@@ -50,14 +45,14 @@ async def end(hmi: HmiNow, caller: GenuineCaller, job: JobId) -> Response:
     """Cancel a job."""
     if not caller.name:
         raise Problem(403, "problem.not_allowed", role="operator")
-    await hmi.gateway.request(EndJob(job=job), JobView, deadline_s=DEADLINE_S)
+    await hmi.jobs.end(job)
     return go_to(f"/jobs/{job}")
 
 
 @router.get("/{job}/file/{name}", dependencies=[Depends(logged_in)])
 async def file(hmi: HmiNow, job: JobId, name: FileName) -> Response:
     """Send one of its files for download."""
-    return await _sent(hmi, job, name, {"content-disposition": f'attachment; filename="{name}"'})
+    return _sent(hmi, job, name, {"content-disposition": f'attachment; filename="{name}"'})
 
 
 @router.get("/{job}/show/{name}", dependencies=[Depends(logged_in)])
@@ -65,12 +60,11 @@ async def display(hmi: HmiNow, job: JobId, name: FileName) -> Response:
     """Send one of its documents for display in the browser."""
     if not name.endswith(".html"):
         raise Problem(404, "problem.not_found")
-    return await _sent(hmi, job, name, {"content-security-policy": SHOWN_POLICY, "content-disposition": "inline"})
+    return _sent(hmi, job, name, {"content-security-policy": SHOWN_POLICY, "content-disposition": "inline"})
 
 
-async def _sent(hmi: Hmi, job: str, name: str, headers: dict[str, str]) -> Response:
-    reply = await hmi.gateway.request(GetJob(job=job), JobView, deadline_s=DEADLINE_S)
-    found = next((each for each in reply.files if each.name == name), None)
+def _sent(hmi: Hmi, job: str, name: str, headers: dict[str, str]) -> Response:
+    found = next((each for each in hmi.jobs.get(job).files if each.path.name == name), None)
     if found is None:
         raise Problem(404, "problem.not_found")
     return FileResponse(found.path, media_type=found.media_type, headers=headers)

@@ -25,7 +25,6 @@ from hmi.web.sessions import Caller
 from hmi.web.translation import Locale
 from station.channel.line import Noted
 from station.channel.messages import RefusedError
-from station.channel.panel_queries import JobView
 from station.channel.panel_recipe_orders import (
     LARGEST_TEXT,
     ApproveRecipe,
@@ -34,7 +33,6 @@ from station.channel.panel_recipe_orders import (
     RejectRecipe,
     RevertRecipe,
     SaveDraft,
-    StartWhatIf,
     SubmitRecipe,
 )
 from station.charts.area_chart import Curve, Kind, Limit
@@ -197,15 +195,14 @@ async def import_file(hmi: HmiNow, caller: Editor, reason: Reason, file: Annotat
     return go_to(f"/recipes/{imported.name}")
 
 
-@router.post("/{name}/whatif")
-async def whatif(
-    hmi: HmiNow, name: Name, caller: Editor, last: Annotated[int, Form(ge=1, le=100_000)] = 500
-) -> Response:
+@router.post("/{name}/whatif", dependencies=[Depends(orders(Right.EDIT_RECIPES))])
+async def whatif(hmi: HmiNow, name: Name, last: Annotated[int, Form(ge=1, le=100_000)] = 500) -> Response:
     """Judge the latest fruit again by the file as it is."""
-    job = await hmi.gateway.request(
-        StartWhatIf(name=name, last=last, actor=actor_of(caller)), JobView, deadline_s=DEADLINE_S
-    )
-    return go_to(f"/jobs/{job.job}?back=/recipes/{name}")
+    text = (await _state(hmi, name)).valid_file.text
+    folder = hmi.jobs.folder({f"{name}.yaml": text})
+    arguments = ["whatif", "--recipe", str(folder / f"{name}.yaml"), "--last", str(last), "--jobs", "1"]
+    job = hmi.jobs.begin("whatif", folder, [*arguments, "--out", str(folder)], last)
+    return go_to(f"/jobs/{job.id}?back=/recipes/{name}")
 
 
 async def _order(hmi: Hmi, order: SubmitRecipe | ApproveRecipe | RejectRecipe | RevertRecipe) -> Response:

@@ -14,6 +14,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Match, Route
 
 from hmi.api.model import ApiMessage, Error
+from hmi.jobs.queue import Jobs
 from hmi.past.past import PanelBusyError, Past, RecordsError
 from hmi.web.access import locale_of
 from hmi.web.assets import Assets
@@ -31,7 +32,7 @@ from hmi.web.streams import stream_places
 from hmi.web.user_store import UserStore
 from station.channel.messages import ChannelError, DeadlineError
 from station.channel.panel_live import PersonNoted
-from station.errors import BadInputError, StationError
+from station.errors import StationError
 from station.messages.message import Message
 from station.settings.configuration import Configuration
 from station.settings.hmi import panel_endpoint
@@ -59,6 +60,7 @@ def make_context(site: Configuration, file: Path | None) -> Hmi:
         settings=settings,
         gateway=gateway,
         past=Past(site),
+        jobs=Jobs(site.home),
         sessions=Sessions(settings.idle_s),
         people=UserStore(site.home / FOLDER),
         pins=LoginRateLimiter(),
@@ -79,6 +81,7 @@ def make_app(hmi: Hmi) -> SecurityMiddleware:
         async with contextlib.AsyncExitStack() as stack:
             stack.enter_context(hmi.past)
             await stack.enter_async_context(hmi.gateway)
+            stack.push_async_callback(hmi.jobs.close)
             sweeping = asyncio.create_task(_sweep(hmi), name="logging out who is idle")
             try:
                 yield
@@ -98,9 +101,7 @@ def make_app(hmi: Hmi) -> SecurityMiddleware:
             HTTPException: _http,
             RequestValidationError: _bad_form,
             ChannelError: _away,
-            RecordsError: _unread,
-            PanelBusyError: _unread,
-            BadInputError: _unread,
+            StationError: _refused,
             Exception: _broken,
         },
     )
@@ -160,10 +161,10 @@ async def _away(request: Request, error: Exception) -> Response:
     return _problem_answer(request, 409, locale_of(request).text("problem.refused"), error.message)
 
 
-async def _unread(request: Request, error: Exception) -> Response:
-    """Answer that the records or recipes do not have it, or cannot be read."""
+async def _refused(request: Request, error: Exception) -> Response:
+    """Answer with what this process itself found wrong: in the records, a recipe or a job."""
     assert isinstance(error, StationError)  # noqa: S101 (what it is registered for)
-    key = "problem.refused" if isinstance(error, BadInputError) else "problem.records"
+    key = "problem.records" if isinstance(error, RecordsError | PanelBusyError) else "problem.refused"
     return _problem_answer(request, 409, locale_of(request).text(key), error.message)
 
 

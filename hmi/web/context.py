@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from hmi.jobs.queue import Jobs
 from hmi.past.past import Past
 from hmi.web.assets import Assets
 from hmi.web.gateway import Gateway
@@ -21,6 +22,7 @@ class Hmi:
     settings: HmiSettings
     gateway: Gateway
     past: Past
+    jobs: Jobs
     sessions: Sessions
     people: UserStore
     pins: LoginRateLimiter

@@ -1,15 +1,11 @@
-"""Orders of the operators' pages on the records: lots, exports, reports; and their jobs.
+"""Orders of the operators' pages on the records: lots, and what the audit trail has of exports."""
 
-A long operation is a job: it is started and polled, and the pages then send its files.
-"""
-
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
 from pydantic import ConfigDict, Field
 
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
-from station.messages.message import Message
 from station.vocabulary import OutcomeName, Reason
 
 LARGEST_PAGE = 100
@@ -68,56 +64,9 @@ class EndLot(ChannelMessage):
     actor: Actor
 
 
-class StartExport(ChannelMessage):
-    """Export a search's results as a table, as a job."""
+class NoteExport(ChannelMessage):
+    """An export of a search's results, for the audit trail, before it begins. Answered with `Noted`."""
 
     purpose: ClassVar[str] = "to export inspections"
     search: Search
-    form: Literal["csv", "parquet"]
     actor: Actor
-
-
-class StartLotReport(ChannelMessage):
-    """Write a lot's report, as a job."""
-
-    purpose: ClassVar[str] = "for a lot's report"
-    lot: str = Field(max_length=32)
-    actor: Actor
-
-
-class GetJob(ChannelMessage):
-    """Query the state of a job."""
-
-    purpose: ClassVar[str] = "for a job"
-    job: str = Field(pattern=r"^[0-9a-f]{32}$")
-
-
-class EndJob(ChannelMessage):
-    """Cancel a job. Idempotent; answered with `JobView`."""
-
-    purpose: ClassVar[str] = "to call a job off"
-    job: str = Field(pattern=r"^[0-9a-f]{32}$")
-
-
-class JobFile(ChannelMessage):
-    """A file that a job has written."""
-
-    path: str
-    name: str
-    size_bytes: int
-    media_type: str
-
-
-class JobView(ChannelMessage):
-    """State of a job."""
-
-    job: str
-    kind: Literal["export", "lot_report", "whatif"]
-    state: Literal["waiting", "running", "done", "failed", "ended"]
-    done: int
-    of: int
-    """0 where it is not known."""
-    message: Message | None
-    """Why it failed: a limit of the queue, or the command's last output."""
-    files: tuple[JobFile, ...]
-    """Once it is done."""

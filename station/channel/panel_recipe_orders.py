@@ -85,12 +85,3 @@ class ImportedRecipe(ChannelMessage):
     """An imported recipe."""
 
     name: str
-
-
-class StartWhatIf(ChannelMessage):
-    """Judge the last inspections again by the recipe's file as it is, as a job."""
-
-    purpose: ClassVar[str] = "what a draft would have done"
-    name: Name
-    last: int = Field(default=500, ge=1, le=100_000)
-    actor: Actor

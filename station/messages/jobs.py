@@ -34,4 +34,3 @@ NO_TIME = define("job.no_time", "{utc_ms} ms is no time of a calendar; give anot
 UNPRINTABLE = define(
     "job.unprintable", "{text} contains what cannot be printed; give a name of printable letters", text=Name()
 )
-NOT_WRITTEN = define("job.not_written", "{file}: {error}; free space", file=Name(), error=Name())

@@ -11,11 +11,10 @@ from typing import Any
 import psutil
 import pytest
 
+from hmi.jobs.queue import MOST_WAITING, Job, JobError, Jobs
 from hmi.past.recipes import PastRecipes, RecipeList
-from station.channel.panel_queries import JobView
 from station.channel.worker import MOST_WAITING as MOST_QUESTIONS
 from station.channel.worker import PanelBusyError, PanelWorker
-from station.runtime.rpc.jobs import MOST_WAITING, JobError, PanelJobs
 from station.settings.recipe import load_recipes
 
 PATIENCE_S = 60.0
@@ -24,17 +23,17 @@ FAIL = "import sys; sys.exit('the disk is full')"
 WAIT = "import sys, time, pathlib; pathlib.Path(sys.argv[1], 'begun').touch(); time.sleep(600)"
 
 
-async def until(jobs: PanelJobs, job: str, wanted: Callable[[JobView], Any]) -> JobView:
+async def until(jobs: Jobs, job: str, wanted: Callable[[Job], Any]) -> Job:
     deadline_s = time.monotonic() + PATIENCE_S
-    while not wanted(told := jobs.state(job)):
+    while not wanted(told := jobs.get(job)):
         assert time.monotonic() < deadline_s, told
         await asyncio.sleep(0.02)
     return told
 
 
-def with_jobs(home: Path, code: str, work: Callable[[PanelJobs], Any]) -> None:
+def with_jobs(home: Path, code: str, work: Callable[[Jobs], Any]) -> None:
     async def run() -> None:
-        jobs = PanelJobs(home, (sys.executable, "-c", code))
+        jobs = Jobs(home, (sys.executable, "-c", code))
         try:
             await work(jobs)
         finally:
@@ -44,21 +43,21 @@ def with_jobs(home: Path, code: str, work: Callable[[PanelJobs], Any]) -> None:
 
 
 def test_a_jobs_file_is_named_with_its_place_and_no_other_is(tmp_path: Path) -> None:
-    async def work(jobs: PanelJobs) -> None:
+    async def work(jobs: Jobs) -> None:
         folder = jobs.folder()
-        job = jobs.begin("export", folder, [str(folder)]).job
+        job = jobs.begin("export", folder, [str(folder)]).id
         told = await until(jobs, job, lambda told: told.state == "done")
-        assert [(file.name, file.size_bytes) for file in told.files] == [("inspections.csv", 5_000_000)]
+        assert [(file.path.name, file.size_bytes) for file in told.files] == [("inspections.csv", 5_000_000)]
         (folder / "secret").write_text("x")
-        assert [file.path for file in jobs.state(job).files] == [str(folder / "inspections.csv")]
+        assert [file.path for file in told.files] == [folder / "inspections.csv"]
 
     with_jobs(tmp_path, WRITE, work)
 
 
 def test_a_job_that_fails_tells_its_last_words_and_leaves_nothing(tmp_path: Path) -> None:
-    async def work(jobs: PanelJobs) -> None:
+    async def work(jobs: Jobs) -> None:
         folder = jobs.folder()
-        told = await until(jobs, jobs.begin("export", folder, [str(folder)]).job, lambda told: told.state == "failed")
+        told = await until(jobs, jobs.begin("export", folder, [str(folder)]).id, lambda told: told.state == "failed")
         assert str(told.message) == "the disk is full"
         assert told.files == ()
         assert not folder.exists()
@@ -69,18 +68,19 @@ def test_a_job_that_fails_tells_its_last_words_and_leaves_nothing(tmp_path: Path
 def test_a_job_called_off_ends_its_process_and_too_many_are_refused(tmp_path: Path) -> None:
     before = set(psutil.Process().children())
 
-    async def work(jobs: PanelJobs) -> None:
+    async def work(jobs: Jobs) -> None:
         folders = []
         begun = []
         for _ in range(MOST_WAITING):
             folders.append(jobs.folder())
-            begun.append(jobs.begin("export", folders[-1], [str(folders[-1])]).job)
+            begun.append(jobs.begin("export", folders[-1], [str(folders[-1])]).id)
         with pytest.raises(JobError):
             jobs.folder()
         await until(jobs, begun[0], lambda _: (folders[0] / "begun").exists())
         assert set(psutil.Process().children()) - before
         for job in begun:
-            assert (await jobs.end(job)).state == "ended"
+            await jobs.end(job)
+            assert jobs.get(job).state == "ended"
         assert not set(psutil.Process().children()) - before
         assert not any(folder.exists() for folder in folders)
         jobs.folder()

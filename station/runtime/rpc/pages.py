@@ -11,7 +11,6 @@ from station.runtime.observability.observability import Observability
 from station.runtime.production.production import Production
 from station.runtime.rpc.calibration import PanelCalibration
 from station.runtime.rpc.history import PanelHistory
-from station.runtime.rpc.jobs import PanelJobs
 from station.runtime.rpc.log import LogRing
 from station.runtime.rpc.maintenance import PanelMaintenance
 from station.runtime.rpc.recipes import PanelRecipes
@@ -33,9 +32,9 @@ class PanelPages:
         production: Production,
         observability: Observability,
     ) -> None:
-        self._worker, self._log, self._jobs = PanelWorker(), LogRing(), PanelJobs(configuration.home)
-        history = PanelHistory(records, self._worker, self._jobs)
-        recipes = PanelRecipes(configuration.home, configuration.recipes_folder, self._worker, self._jobs)
+        self._worker, self._log = PanelWorker(), LogRing()
+        history = PanelHistory(records)
+        recipes = PanelRecipes(configuration.home, configuration.recipes_folder, self._worker)
         maintenance = PanelMaintenance(production, observability, configuration.home, self._worker, self._log)
         self._ball = PanelCalibration(
             configuration, production, records, observability.audit, self._worker, maintenance.refusal
@@ -53,7 +52,6 @@ class PanelPages:
         """Store log lines from now on."""
         self._open.callback(self._worker.close)
         self._open.enter_context(self._log)
-        self._open.push_async_callback(self._jobs.close)
         self._open.push_async_callback(self._ball.close)
         return self
 

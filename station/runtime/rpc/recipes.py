@@ -6,7 +6,6 @@ from pathlib import Path
 from station.channel.line import Noted
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
-from station.channel.panel_queries import JobView
 from station.channel.panel_recipe_orders import (
     ApproveRecipe,
     ImportedRecipe,
@@ -14,34 +13,30 @@ from station.channel.panel_recipe_orders import (
     RejectRecipe,
     RevertRecipe,
     SaveDraft,
-    StartWhatIf,
     SubmitRecipe,
 )
 from station.channel.server import Handler
 from station.channel.worker import PanelWorker
-from station.errors import BadInputError, StationError
+from station.errors import BadInputError
 from station.messages import recipes as messages
-from station.messages.jobs import NOT_WRITTEN
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
 from station.recipe_store.recipe_state import FileState
 from station.recipe_store.revision import STATUS, ConflictError, Status
 from station.recipe_store.store import RecipeStore
-from station.runtime.rpc.jobs import PanelJobs
 
 
 class PanelRecipes:
-    """Changes of recipes, and what-ifs.
+    """Changes of recipes.
 
     Args:
         folder: the site's recipe files; None for those shipped.
         worker: runs what blocks.
-        jobs: runs what-ifs.
     """
 
-    def __init__(self, home: Path, folder: Path | None, worker: PanelWorker, jobs: PanelJobs) -> None:
+    def __init__(self, home: Path, folder: Path | None, worker: PanelWorker) -> None:
         self._store, self._editor = RecipeStore(home, folder), RecipeEditor(home, folder)
-        self._worker, self._jobs = worker, jobs
+        self._worker = worker
 
     def handlers(self) -> dict[type[ChannelMessage], Handler]:
         """Return the handler of each request."""
@@ -52,7 +47,6 @@ class PanelRecipes:
             RejectRecipe: self.reject,
             RevertRecipe: self.revert,
             ImportRecipe: self.import_text,
-            StartWhatIf: self.start_whatif,
         }
 
     async def save_draft(self, request: SaveDraft) -> Noted:
@@ -111,21 +105,6 @@ class PanelRecipes:
             return state.name
 
         return ImportedRecipe(name=await self._worker.do(import_text))
-
-    async def start_whatif(self, request: StartWhatIf) -> JobView:
-        """Judge stored inspections again by the recipe's file as it is now."""
-        folder = self._jobs.folder()
-        draft = folder / f"{request.name}.yaml"
-
-        def write() -> None:
-            try:
-                draft.write_text(self._store.state(request.name).valid_file.text, encoding="utf-8")
-            except OSError as error:
-                raise StationError(NOT_WRITTEN(file=str(draft), error=error.strerror or str(error))) from error
-
-        await self._worker.do(write)
-        arguments = ["whatif", "--recipe", str(draft), "--last", str(request.last), "--jobs", "1"]
-        return self._jobs.begin("whatif", folder, [*arguments, "--out", str(folder)], request.last)
 
     async def _change(self, change: Callable[[], object]) -> Noted:
         await self._worker.do(change)

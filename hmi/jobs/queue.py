@@ -1,6 +1,6 @@
 """Long jobs of the pages: the station's own commands, each in a process with less priority than the cycle.
 
-A thread would share Python's one interpreter lock with the cycle; a process shares only the processor, at the lowest
+The station has no part in them: they read the records, and share only the processor with the cycle, at the lowest
 priority.
 """
 
@@ -12,12 +12,12 @@ import shutil
 import signal
 import sys
 import uuid
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from types import MappingProxyType
+from typing import Literal, NamedTuple
 
-from station.channel.panel_queries import JobFile, JobView
 from station.errors import StationError
 from station.messages import jobs as messages
 from station.messages.message import Message, verbatim
@@ -42,6 +42,18 @@ Kind = Literal["export", "lot_report", "whatif"]
 log = logging.getLogger(__name__)
 
 
+class JobFile(NamedTuple):
+    """A file that a job has written."""
+
+    path: Path
+    media_type: str
+
+    @property
+    def size_bytes(self) -> int:
+        """Return its size."""
+        return self.path.stat().st_size
+
+
 class JobError(StationError):
     """A job that cannot start, or does not exist."""
 
@@ -64,8 +76,23 @@ class Job:
         """Whether the job is not finished."""
         return self.state in {"waiting", "running"}
 
+    @property
+    def files(self) -> tuple[JobFile, ...]:
+        """Return its files, once it is done."""
+        found = sorted(self.folder.iterdir()) if self.state == "done" else ()
+        return tuple(JobFile(path, _MEDIA[path.suffix]) for path in found if path.suffix in _MEDIA)
 
-class PanelJobs:
+    @property
+    def done(self) -> int:
+        """Return a what-if's progress from the file that it appends to; the first line is a heading."""
+        if self.state == "done":
+            return self.of
+        with contextlib.suppress(OSError):
+            return max(0, (self.folder / _PROGRESS).read_bytes().count(b"\n") - 1)
+        return 0
+
+
+class Jobs:
     """Queue that runs one job after the other.
 
     Args:
@@ -78,8 +105,11 @@ class PanelJobs:
         self._jobs: dict[str, Job] = {}
         self._turn = asyncio.Lock()
 
-    def folder(self) -> Path:
+    def folder(self, files: Mapping[str, str] = MappingProxyType({})) -> Path:
         """Make a new job's folder, whose name is its id.
+
+        Args:
+            files: texts to put there, by name.
 
         Raises:
             JobError: too many wait, or the disk is full.
@@ -91,6 +121,8 @@ class PanelJobs:
             if not self._jobs:
                 shutil.rmtree(folder.parent, ignore_errors=True)  # of the start before
             folder.mkdir(parents=True)
+            for name, text in files.items():
+                (folder / name).write_text(text, encoding="utf-8")
             free_bytes = shutil.disk_usage(folder).free
         except OSError as error:
             raise JobError(messages.NO_FOLDER(folder=str(folder.parent), error=error.strerror or str(error))) from error
@@ -98,7 +130,7 @@ class PanelJobs:
             raise JobError(messages.DISK_FULL(free_mb=free_bytes // 1_000_000, folder=str(folder.parent)))
         return folder
 
-    def begin(self, kind: Kind, folder: Path, arguments: Sequence[str], of: int = 0) -> JobView:
+    def begin(self, kind: Kind, folder: Path, arguments: Sequence[str], of: int = 0) -> Job:
         """Queue a job. Not idempotent.
 
         Args:
@@ -110,44 +142,26 @@ class PanelJobs:
         self._jobs[job.id] = job
         job.task = asyncio.create_task(self._run(job), name=f"job {kind}")
         self._forget()
-        return self.state(job.id)
+        return job
 
-    def state(self, job_id: str) -> JobView:
-        """Return a job's state.
+    def get(self, job_id: str) -> Job:
+        """Return a job.
 
         Raises:
             JobError: there is no such job.
         """
-        job = self._get(job_id)
-        files = tuple(
-            JobFile(
-                path=str(path.absolute()),
-                name=path.name,
-                size_bytes=path.stat().st_size,
-                media_type=_MEDIA[path.suffix],
-            )
-            for path in sorted(job.folder.iterdir() if job.state == "done" else ())
-            if path.suffix in _MEDIA
-        )
-        return JobView(
-            job=job.id,
-            kind=job.kind,
-            state=job.state,
-            done=self._progress(job),
-            of=job.of,
-            message=job.message,
-            files=files,
-        )
+        if job_id not in self._jobs:
+            raise JobError(messages.UNKNOWN())
+        return self._jobs[job_id]
 
-    async def end(self, job_id: str) -> JobView:
+    async def end(self, job_id: str) -> None:
         """Cancel a job. Idempotent."""
-        job = self._get(job_id)
+        job = self.get(job_id)
         if job.task is not None and job.open:
             job.task.cancel()
             await asyncio.gather(job.task, return_exceptions=True)
             if job.open:  # cancelled before it ran at all
                 job.state = "ended"
-        return self.state(job_id)
 
     async def close(self) -> None:
         """End the running job. Idempotent."""
@@ -198,19 +212,6 @@ class PanelJobs:
             await _ended(process)
         words = stderr.decode("utf-8", "replace").strip().splitlines()
         return process.returncode or 0, words[-1][:1000] if process.returncode and words else ""
-
-    def _progress(self, job: Job) -> int:
-        """Return a what-if's progress from the file that it appends to; the first line is a heading."""
-        if job.state == "done":
-            return job.of
-        with contextlib.suppress(OSError):
-            return max(0, (job.folder / _PROGRESS).read_bytes().count(b"\n") - 1)
-        return 0
-
-    def _get(self, job_id: str) -> Job:
-        if job_id not in self._jobs:
-            raise JobError(messages.UNKNOWN())
-        return self._jobs[job_id]
 
     def _forget(self) -> None:
         over = [job for job in self._jobs.values() if not job.open]
