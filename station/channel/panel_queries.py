@@ -8,9 +8,6 @@ from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.vocabulary import OutcomeName, Reason
 
-LARGEST_PAGE = 100
-
-Sequence = Annotated[int, Field(ge=1, lt=2**32)]
 Text = Annotated[str, Field(max_length=64)]
 Why = Annotated[str, Field(min_length=1, max_length=1000)]
 UtcMs = Annotated[int, Field(ge=0, lt=2**63)]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from sqlalchemy import Connection, func, select, true
+from sqlalchemy import Connection, func, select
 
 from station.channel.line import Outcome, OutcomeName
 from station.messages import records as messages
@@ -147,24 +147,6 @@ def read_summaries(connection: Connection, sequences: Sequence[int]) -> list[Sum
         areas[sequence].append(area_mm2)
     rows = database.execute(_SUMMARIES, wanted)
     return [Summary._make((*row[:7], tuple(json.loads(row[7] or "[]")), tuple(areas[row[0]]), row[8])) for row in rows]
-
-
-def read_totals(connection: Connection, boot: str | None = None) -> dict[tuple[str, str, str], int]:
-    """Count the outcomes that the PLC was given, by fruit, outcome and first reason, as the metrics count them.
-
-    Args:
-        boot: count the inspections that this start of the station began; all by default.
-    """
-    table = inspections.c
-    reason = func.coalesce(func.json_extract(table.standing, "$.reasons[0]"), "none")
-    fruit = func.coalesce(recipe_snapshots.c.name, "none")
-    query = (
-        select(fruit, table.outcome, reason, func.count())
-        .outerjoin(recipe_snapshots, recipe_snapshots.c.sha256 == table.recipe_sha256)
-        .where(table.published_utc_ms.is_not(None), true() if boot is None else table.boot == boot)
-        .group_by(fruit, table.outcome, reason)
-    )
-    return {(name, outcome, why): number for name, outcome, why, number in connection.execute(query)}
 
 
 def _recipe(connection: Connection, row: Any) -> RecipeSnapshot | None:

@@ -22,7 +22,7 @@ from station.records.errors import DamagedError, DiskFullError, RecordsClosedErr
 from station.records.images import MB, accepted_is_stored
 from station.records.model import AlarmEntry, AlarmRow, FullRecord, InspectionRecord, OpenInspections, Trigger
 from station.records.open import Notice, Opened, lock_folder, open_records
-from station.records.queries import read_alarms, read_inspection, read_open, read_totals
+from station.records.queries import read_alarms, read_inspection, read_open
 from station.records.write_requests import (
     acknowledge,
     add_counts,
@@ -285,14 +285,6 @@ class Records:
             UnknownInspectionError: there is no record of it.
         """
         return await self._read(lambda connection: read_inspection(connection, sequence, self.folder))
-
-    async def totals(self, boot: str | None = None) -> dict[tuple[str, str, str], int]:
-        """Count the outcomes that the PLC was given, by fruit, outcome and first reason (`none` for PASS).
-
-        Args:
-            boot: count the inspections that this start of the station began; all by default.
-        """
-        return await self._read(lambda connection: read_totals(connection, boot))
 
     async def save_alarms(self, active: Sequence[AlarmRow], log: Sequence[AlarmEntry] = ()) -> None:
         """Replace the stored alarms and append to their log, in one transaction."""

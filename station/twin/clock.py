@@ -1,4 +1,4 @@
-"""The twin's time, which tests can run ahead."""
+"""The twin's time, which a test's own clock can run ahead."""
 
 import time
 from typing import Protocol
@@ -18,27 +18,3 @@ class SteadyClock:
     def now_s(self) -> float:
         """The machine's monotonic time in seconds."""
         return time.monotonic()
-
-
-class ManualClock:
-    """A clock that moves only when a test moves it."""
-
-    def __init__(self) -> None:
-        self._now_s = 0.0
-
-    def now_s(self) -> float:
-        """The time that the test has reached, in seconds."""
-        return self._now_s
-
-    def advance(self, duration_s: float) -> None:
-        """Move on.
-
-        Args:
-            duration_s: seconds, not negative.
-
-        Raises:
-            ValueError: the duration is negative.
-        """
-        if duration_s < 0:
-            raise ValueError(f"a clock cannot go back by {-duration_s} s")
-        self._now_s += duration_s

@@ -257,21 +257,6 @@ def test_alarms_counters_and_events_outlive_a_restart(opened, scenario, folder):
     connection.close()
 
 
-def test_totals_count_what_the_plc_was_told(opened, scenario, trigger, passed, failed):
-    async def steps():
-        async with opened() as records:
-            for record in (passed, passed, failed, failed):
-                sequence = await records.begin(trigger)
-                outcome = await records.conclude(sequence, record)
-                if sequence != 4:
-                    await records.published(outcome)
-            expected = {("strawberry", "PASS", "none"): 2, ("strawberry", "FAIL", "area_over_limit"): 1}
-            assert await records.totals() == await records.totals("boot-1") == expected
-            assert await records.totals("another") == {}
-
-    scenario(steps)
-
-
 def test_a_second_station_is_refused(opened, scenario):
     async def steps():
         async with opened():

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from station.twin.clock import ManualClock
 from station.twin.contact import FruitOnGel, Pose
 from station.twin.fruit import Kind, draw_fruit
 from station.twin.gel import MM_PER_PX, Gel, Surface, dent_mm, half_space_surface
 from station.twin.squeeze import Squeeze
 from station.twin.world import DIGIT_MM, World
+from tests.manual_clock import ManualClock
 
 KINDS = st.sampled_from(list(Kind))
 

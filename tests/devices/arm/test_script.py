@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from station.twin.clock import ManualClock
 from station.twin.ur.body import Body
 from station.twin.ur.registers import Registers
 from station.twin.ur.safety import Safety
 from station.twin.ur.script import ControlScript, RuntimeState
+from tests.manual_clock import ManualClock
 
 HOME = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
 READY, DONE = 1, 2

@@ -10,13 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymodbus.framer import FramerRTU
 
-from station.twin.clock import ManualClock
 from station.twin.robotiq.faults import gripper_faults
 from station.twin.robotiq.fingers import Fingers
 from station.twin.robotiq.load import Spring
 from station.twin.robotiq.model import RobotiqGripper
 from station.twin.robotiq.registers import Command
 from station.twin.robotiq.rtu import RequestFramer, answer, crc16, framed
+from tests.manual_clock import ManualClock
 
 RESET = "09 10 03 E8 00 03 06 00 00 00 00 00 00 73 30"
 ACKNOWLEDGED = "09 10 03 E8 00 03 01 30"

@@ -7,12 +7,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
-from station.twin.clock import ManualClock
 from station.twin.faults import CommonFault, FaultBoard
 from station.twin.robotiq.faults import Code, GripperFault, gripper_faults
 from station.twin.robotiq.load import Load, Spring
 from station.twin.robotiq.model import RobotiqGripper
 from station.twin.robotiq.registers import Command
+from tests.manual_clock import ManualClock
 
 CLOSE = Command(activate=True, go_to=True, position=255)
 OPEN = Command(activate=True, go_to=True, position=0)
