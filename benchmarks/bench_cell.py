@@ -17,8 +17,8 @@ import psutil
 from station.devices.arm.ur import UrArm
 from station.devices.camera.open import camera_from
 from station.devices.gripper.robotiq import make_gripper
+from station.memory import keep_freed_memory
 from station.settings.configuration import Configuration, load_configuration
-from station.supervision.memory import keep_freed_memory
 
 ROOT = Path(__file__).resolve().parents[1]
 HOST = "127.0.0.9"

@@ -24,9 +24,9 @@ from matplotlib import pyplot as plt
 
 from station.devices.camera.health import FrameHealth
 from station.devices.camera.twin import TwinCamera
+from station.memory import keep_freed_memory
 from station.settings.camera import CameraSettings, TwinCameraSettings
 from station.settings.segmentation import PaperParameters
-from station.supervision.memory import keep_freed_memory
 from station.twin.clock import SteadyClock
 from station.twin.digit.fit import (
     PRESS_GAP_S,

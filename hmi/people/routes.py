@@ -16,7 +16,7 @@ from hmi.web.roles import Right, Role
 from hmi.web.sessions import Caller
 from hmi.web.user_store import UserStoreError, least_digits
 from station.channel.panel_live import PersonNoted
-from station.supervision.guard import is_loopback
+from station.serving.guard import is_loopback
 
 router = APIRouter()
 ENTRY = Entry("people", "/people")

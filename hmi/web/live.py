@@ -14,8 +14,8 @@ from hmi.web.roles import RIGHTS, Right, Role
 from hmi.web.sessions import Caller
 from hmi.web.streams import Stream
 from hmi.web.translation import Locale
+from station.serving.places import Places
 from station.settings.hmi import Language
-from station.supervision.places import Places
 
 BEAT_S = 0.5
 """Period of a page's events if nothing changes."""

@@ -4,7 +4,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 
-from station.supervision.guard import is_loopback
+from station.serving.guard import is_loopback
 
 FREE_TRIES = 4
 FIRST_WAIT_S = 5.0

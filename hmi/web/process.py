@@ -11,11 +11,11 @@ from starlette.types import ASGIApp
 
 from hmi.web.app import make_app, make_context
 from station.errors import BadInputError
+from station.serving.guard import GuardedListener, Limits
+from station.serving.server import AddressError, Server, listen
 from station.settings.configuration import Configuration
 from station.settings.hmi import HmiSettings, address_of
-from station.supervision.guard import GuardedListener, Limits
 from station.supervision.notify import feed_watchdog, notify
-from station.supervision.serving import AddressError, Server, listen
 
 START_S = 30.0
 MOST_CONNECTIONS, RESERVED_CONNECTIONS = 200, 200

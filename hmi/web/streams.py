@@ -2,7 +2,7 @@
 
 import time
 
-from station.supervision.places import Places
+from station.serving.places import Places
 
 MOST_STREAMS, RESERVED_STREAMS = 100, 100
 """Of all strangers together; of people who are logged in, and of known addresses."""

@@ -11,11 +11,11 @@ import cv2
 import numpy as np
 
 from station.errors import BadInputError
+from station.memory import keep_freed_memory
 from station.settings.arm import ArmPoses, ArmSettings
 from station.settings.camera import TwinCameraSettings
 from station.settings.can import CanSettings
 from station.settings.gripper import GripperSettings
-from station.supervision.memory import keep_freed_memory
 from station.supervision.notify import feed_watchdog, notify
 from station.twin.can.faults import line_faults
 from station.twin.can.line import LineNodes

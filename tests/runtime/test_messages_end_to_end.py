@@ -30,9 +30,9 @@ from station.logs import configure_logging
 from station.messages import commands, recipes, records, settings
 from station.messages.message import VERBATIM, Message, definitions
 from station.messages.reasons import reason_message
+from station.serving.guard import Limits
+from station.serving.server import Server, listen
 from station.settings.configuration import Configuration
-from station.supervision.guard import Limits
-from station.supervision.serving import Server, listen
 from station.vocabulary import Reason, Refusal
 
 NUMBER = 2

@@ -13,8 +13,8 @@ from starlette.routing import Route
 
 from station.messages.message import Message
 from station.runtime.observability.metrics import Metrics
-from station.supervision.guard import GuardedListener, Limits
-from station.supervision.serving import AddressError, Server, listen
+from station.serving.guard import GuardedListener, Limits
+from station.serving.server import AddressError, Server, listen
 
 START_S = 5.0
 LIMITS = Limits(most=64, per_address=32, reserve=32)

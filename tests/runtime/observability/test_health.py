@@ -13,7 +13,7 @@ import pytest
 
 from station.messages.message import verbatim
 from station.runtime.observability.health import Dependency, HealthServer, Liveness, Readiness
-from station.supervision.serving import AddressError
+from station.serving.server import AddressError
 
 NOT_READY = Readiness(
     ready=False,

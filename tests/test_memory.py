@@ -6,7 +6,7 @@ import sys
 FAULTS = """
 import resource, sys
 import numpy as np
-from station.supervision.memory import keep_freed_memory
+from station.memory import keep_freed_memory
 if sys.argv[1] == "kept":
     keep_freed_memory()
 held = []

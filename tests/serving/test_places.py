@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from station.supervision.places import FLOOD_BURST, FLOOD_S, Places
+from station.serving.places import FLOOD_BURST, FLOOD_S, Places
 
 
 class Clock:

@@ -12,7 +12,7 @@ from starlette.datastructures import Headers
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from station.supervision.places import Places
+from station.serving.places import Places
 
 FIRST_REQUEST_S = 10.0
 """From the connection's begin, TLS handshake included, to the end of its first request, body included."""

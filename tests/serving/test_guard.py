@@ -10,8 +10,8 @@ from starlette.applications import Starlette
 from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
-from station.supervision.guard import Limits, is_loopback
-from station.supervision.serving import Server, listen
+from station.serving.guard import Limits, is_loopback
+from station.serving.server import Server, listen
 
 ASK = b"GET / HTTP/1.1\r\nhost: here\r\n\r\n"
 LARGE = b"GET /large HTTP/1.1\r\nhost: here\r\n\r\n"
@@ -24,9 +24,9 @@ STRANGER, ANOTHER, KNOWN = "127.0.0.9", "127.0.0.8", "127.0.0.1"
 
 @pytest.fixture(autouse=True)
 def short_limits(monkeypatch):
-    monkeypatch.setattr("station.supervision.guard.FIRST_REQUEST_S", 1.0)
-    monkeypatch.setattr("station.supervision.guard.NEXT_REQUEST_S", 2.0)
-    monkeypatch.setattr("station.supervision.guard.STALLED_S", 1.0)
+    monkeypatch.setattr("station.serving.guard.FIRST_REQUEST_S", 1.0)
+    monkeypatch.setattr("station.serving.guard.NEXT_REQUEST_S", 2.0)
+    monkeypatch.setattr("station.serving.guard.STALLED_S", 1.0)
 
 
 class Door:
@@ -154,7 +154,7 @@ def test_a_request_among_a_crowd_of_its_own_address_is_answered(door, sent):
 
 
 def test_who_speaks_is_not_displaced_by_silent_clients(door, monkeypatch):
-    monkeypatch.setattr("station.supervision.guard.FIRST_REQUEST_S", 30.0)
+    monkeypatch.setattr("station.serving.guard.FIRST_REQUEST_S", 30.0)
 
     async def steps(door):
         reader, writer = await door.come()

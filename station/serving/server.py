@@ -10,8 +10,8 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from station.errors import StationError
-from station.supervision.guard import ADMITTED_AT_ONCE, KEEP_ALIVE_S, GuardedListener, Limits, is_loopback
-from station.supervision.memory import return_freed_memory
+from station.memory import return_freed_memory
+from station.serving.guard import ADMITTED_AT_ONCE, KEEP_ALIVE_S, GuardedListener, Limits, is_loopback
 
 CLOSE_S = 1.0
 """Maximum wait for pending answers when closing."""
