@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hmi.web.roles import Role
-from station.inspection.alarm_table import ALARMS
+from station.inspection.alarm_table import ALARMS, AlarmId
 from station.recipe_store.store import RecipeStore
 from station.records.audit import AuditEntry
 from station.records.lots import start_lot
@@ -91,7 +91,7 @@ def test_changes_of_alarms_are_there_while_the_station_is_away(pages, tmp_path):
         log_in(pages, "Ana", Role.ADMIN)
         status, _, body = pages("GET", "/alarms/history")
         assert (status, b"USB" in body, b"of_another_version" in body) == (200, True, True)
-        assert f"<b>{ALARMS['camera_lost'].number}</b>".encode() in body
+        assert f"<b>{ALARMS[AlarmId.CAMERA_LOST].number}</b>".encode() in body
 
 
 def test_a_fruit_that_was_never_judged_has_a_page_too(pages, tmp_path):
