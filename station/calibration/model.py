@@ -85,13 +85,23 @@ class Noise(Stored):
     """The largest drift of the light against the reference, root mean square."""
 
 
-class Calibration(Stored):
-    """One unit's calibration."""
+class Run(Stored):
+    """One run at the ball, whatever came of it."""
 
     schema_version: Literal[1, 2] = 2
     """1: with sentences in the place of messages."""
     id: Stamp
     serial: Serial
+
+    @property
+    def made_at(self) -> datetime:
+        """Return its time, UTC."""
+        return time_of(self.id)
+
+
+class Calibration(Run):
+    """One unit's calibration."""
+
     unit: str
     """The camera's name."""
     operator: str
@@ -120,11 +130,6 @@ class Calibration(Stored):
     checks: tuple[Check, ...]
 
     @property
-    def made_at(self) -> datetime:
-        """Return its time, UTC."""
-        return time_of(self.id)
-
-    @property
     def area_uncertainty(self) -> float:
         """Return the relative uncertainty of an area in mm²."""
         return 2 * self.scale_uncertainty
@@ -135,13 +140,9 @@ class Calibration(Stored):
         return summary(calibration=self.id, scale_mm=self.mm_per_px, percent=100 * self.scale_uncertainty)
 
 
-class Verification(Stored):
+class Verification(Run):
     """One verification of a unit against its calibration."""
 
-    schema_version: Literal[1, 2] = 2
-    """1: with sentences in the place of messages."""
-    id: Stamp
-    serial: Serial
     calibration: Stamp
     operator: str
     passed: bool
@@ -152,23 +153,14 @@ class Verification(Stored):
     curve: tuple[PressPoint, ...]
 
     @property
-    def made_at(self) -> datetime:
-        """Return its time, UTC."""
-        return time_of(self.id)
-
-    @property
     def drift(self) -> float | None:
         """Return the relative change of the ball's area since the calibration."""
         return None if self.area_ratio is None else self.area_ratio - 1.0
 
 
-class Refusal(Stored):
+class Refusal(Run):
     """Measurements that are no valid calibration."""
 
-    schema_version: Literal[1, 2] = 2
-    """1: with sentences in the place of messages."""
-    id: Stamp
-    serial: Serial
     unit: str
     operator: str
     reasons: tuple[Text, ...]
@@ -177,11 +169,6 @@ class Refusal(Stored):
     """Empty if the run ended before the checks."""
     curve: tuple[PressPoint, ...]
     """The steps until the run ended."""
-
-    @property
-    def made_at(self) -> datetime:
-        """Return its time, UTC."""
-        return time_of(self.id)
 
 
 def stamp(at: datetime) -> str:

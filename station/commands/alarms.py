@@ -1,7 +1,6 @@
 """`station alarms`: list, acknowledge and shelve a running station's alarms."""
 
 import asyncio
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,6 +20,7 @@ from station.channel.panel import (
 from station.commands.records_options import by_option, config_option
 from station.errors import StationError
 from station.inspection.alarms import LONGEST_SHELVED_S
+from station.records.clock import formatted
 from station.records.texts import printable
 from station.settings.configuration import load_configuration
 from station.settings.plc import line_endpoint
@@ -103,13 +103,7 @@ async def _ask(config: Path | None, request: ChannelMessage, reply: type[ReplyT]
 
 def _format(each: ListedAlarm) -> str:
     times = "" if each.raised <= 1 else f", {each.raised} times"
-    head = f"{each.alarm} ({each.priority}, {each.state}) since {_time(each.since_utc_ms)}{times}"
+    head = f"{each.alarm} ({each.priority}, {each.state}) since {formatted(each.since_utc_ms)}{times}"
     if each.shelved_until_utc_ms is not None:
-        head = (
-            f"{each.alarm} ({each.priority}) is shelved until {_time(each.shelved_until_utc_ms)} by {each.shelved_by}"
-        )
+        head = f"{each.alarm} ({each.priority}) is shelved until {formatted(each.shelved_until_utc_ms)} by {each.shelved_by}"
     return "\n  ".join([head, str(each.detail or each.cause), f"{each.consequence} {each.action}"])
-
-
-def _time(utc_ms: int) -> str:
-    return datetime.fromtimestamp(utc_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Callable
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from station.recipe_store.history import Person
 from station.recipe_store.recipe_state import FileState, RecipeState
 from station.recipe_store.revision import Revision, Status
 from station.recipe_store.store import RecipeStore
+from station.records.clock import formatted
 from station.settings.configuration import load_configuration
 from station.settings.problems import SettingsError, shortened
 from station.settings.recipe import Recipe, check_recipes, recipe_files
@@ -281,19 +281,15 @@ def _line(standing: RecipeState) -> str:
 def _format_revision(each: Revision, before: Revision | None) -> list[str]:
     """Format a revision in some lines."""
     lines = [f"{each.name} revision {each.revision}: {each.status}, {each.origin}, {each.sha256[:12]}"]
-    lines.append(f"    by {each.author} at {_time(each.created_utc_ms)}: {each.reason}")
+    lines.append(f"    by {each.author} at {formatted(each.created_utc_ms)}: {each.reason}")
     if each.approved_utc_ms is not None:
         by = each.approver or each.author
-        lines.append(f"    approved by {by} at {_time(each.approved_utc_ms)}: {each.approval_reason}")
+        lines.append(f"    approved by {by} at {formatted(each.approved_utc_ms)}: {each.approval_reason}")
     if each.status is Status.RETIRED and each.retired_utc_ms is not None:
-        lines.append(f"    retired by {each.retired_by} at {_time(each.retired_utc_ms)}: {each.retired_reason}")
+        lines.append(f"    retired by {each.retired_by} at {formatted(each.retired_utc_ms)}: {each.retired_reason}")
     if before is not None:
         lines += [f"    {difference}" for difference in differences(before.recipe, each.recipe)]
     return lines
-
-
-def _time(utc_ms: int) -> str:
-    return datetime.fromtimestamp(utc_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
 def _format_recipe(recipe: Recipe) -> str:

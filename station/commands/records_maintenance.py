@@ -1,6 +1,5 @@
 """`station records`: lots, holds, backups and checks."""
 
-from datetime import UTC, datetime
 from pathlib import Path
 
 import click
@@ -10,6 +9,7 @@ from station.errors import StationError
 from station.records.audit import AuditEntry, append_audit
 from station.records.audit_check import Proof
 from station.records.backup import make_backup
+from station.records.clock import formatted
 from station.records.database import reading
 from station.records.holds import hold as place_hold
 from station.records.holds import read_holds
@@ -87,7 +87,7 @@ def hold(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None)
         held = place_hold(connection, _number_or_lot(thing, is_lot=is_lot), reason, by)
         if held not in before:
             append_audit(connection, AuditEntry(by, _ROLE, "images.held", held.description, reason))
-    since = f"since {_time(held.placed_utc_ms)}, by {held.by}: {held.reason}"
+    since = f"since {formatted(held.placed_utc_ms)}, by {held.by}: {held.reason}"
     click.echo(printable(f"the images of {held.description} are retained {since}"))
 
 
@@ -112,7 +112,7 @@ def holds(config: Path | None) -> None:
     """List the inspections and lots whose images are retained, oldest first."""
     with reading(folder_of(config)) as connection:
         for held in read_holds(connection):
-            click.echo(printable(f"{_time(held.placed_utc_ms)}  {held.description}  by {held.by}: {held.reason}"))
+            click.echo(printable(f"{formatted(held.placed_utc_ms)}  {held.description}  by {held.by}: {held.reason}"))
 
 
 @click.command()
@@ -179,9 +179,5 @@ def _number_or_lot(thing: str, *, is_lot: bool) -> int | str:
 
 
 def _lot_line(row: Lot) -> str:
-    ended = "runs" if row.ended_utc_ms is None else f"ended {_time(row.ended_utc_ms)}"
-    return printable(f"{row.name}: {row.grower}, began {_time(row.began_utc_ms)}, {ended}")
-
-
-def _time(utc_ms: int) -> str:
-    return datetime.fromtimestamp(utc_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+    ended = "runs" if row.ended_utc_ms is None else f"ended {formatted(row.ended_utc_ms)}"
+    return printable(f"{row.name}: {row.grower}, began {formatted(row.began_utc_ms)}, {ended}")
