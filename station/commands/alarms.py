@@ -105,5 +105,6 @@ def _format(each: ListedAlarm) -> str:
     times = "" if each.raised <= 1 else f", {each.raised} times"
     head = f"{each.alarm} ({each.priority}, {each.state}) since {formatted(each.since_utc_ms)}{times}"
     if each.shelved_until_utc_ms is not None:
-        head = f"{each.alarm} ({each.priority}) is shelved until {formatted(each.shelved_until_utc_ms)} by {each.shelved_by}"
+        until = formatted(each.shelved_until_utc_ms)
+        head = f"{each.alarm} ({each.priority}) is shelved until {until} by {each.shelved_by}"
     return "\n  ".join([head, str(each.detail or each.cause), f"{each.consequence} {each.action}"])
