@@ -72,7 +72,7 @@ def read_stages(folder: Path, sequence: int, step: int) -> Stages:
     segmentation = gated(recipe.segmentation, _gate_factor(record))
     method = make_method([reference], segmentation)
     # A step is measured with the contact of the step before, and that one with its own: all of them again.
-    tracker, previous = PressTracker(method, segmentation.robust.least_confidence), None
+    tracker, previous = PressTracker(method), None
     for before in range(step):
         previous = tracker.measure_step([_picture(_stored(record, "step", before))])
     contact = method.measure(image, take, previous)
