@@ -38,7 +38,7 @@ class Jaws:
         self.opened_to_mm.append(to_mm)
         self.opened.set()
         self.width_mm = to_mm if self._moves else self.width_mm
-        return MoveResult(to_mm, 0, await self.read())
+        return MoveResult(to_mm, await self.read())
 
 
 class Camera:
