@@ -123,8 +123,9 @@ def groups(part: Part, images: Path, cache: Path) -> Groups:
         "moved debris": Group(data("debris", partial(moved_debris, seeds["debris"])), 0.25),
         "other unit": Group(other_units(own), 0.25, scored="judged"),
         "weak contact": Group(data("weak", partial(weak_contacts, seeds["weak"])), 0.5, scored="found"),
-        "fruit": Group(fruit),
-        "bruised": Group(bruised),
+        # Followed as by the station.
+        "fruit": Group(fruit, followed=True),
+        "bruised": Group(bruised, followed=True),
         "border": Group(data("border", partial(border, seeds["border"]))),
     }
     for kind in KINDS:

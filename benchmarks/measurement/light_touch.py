@@ -120,7 +120,7 @@ def gate_table(contacts: list[Light], presses: list[Beside]) -> list[str]:
         "",
         f"The gate is at {GATE:g}. The untouched twin is that of the plain units above. Beside a real press is beyond",
         f"{UNTOUCHED_RADII:g} radii of its annotated outline, in a single frame against a single reference: what",
-        "stands out there may be the gel that the ball draws down, which does touch, or a real drift.",
+        "exceeds it there may be the gel that the ball draws down, which does touch, or a real drift.",
     ]
 
 
