@@ -133,7 +133,7 @@ def main() -> None:
         f"fruits at {', '.join(f'{mm:g}' for mm in CLOSINGS_MM)} mm, in turn, the quietest of {ROUNDS} rounds each.",
         f"OpenCV {cv2.__version__}, numpy {np.__version__}.",
         "",
-        "| stage | ms | the same step elsewhere | ms |",
+        "| stage | ms | the same step elsewhere | its ms |",
         "|---|---|---|---|",
         *(
             f"| {name} | {ms:.1f} | {peer} | {'' if peer_ms is None else f'{peer_ms:.1f}'} |"

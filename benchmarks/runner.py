@@ -1,0 +1,109 @@
+"""Runner of the benchmarks: chosen ones or all in turn, and `docs/benchmarks.md` from the pages that they wrote.
+
+A whole run, without options, is noted in `benchmarks/runs.json`.
+"""
+
+import ast
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from benchmarks import summary
+from benchmarks.summary import BENCHMARKS
+
+FOLDER = Path(__file__).resolve().parent
+USAGE = """usage: ./run bench                  all but the long ones, in turn; then docs/benchmarks.md is written
+       ./run bench --all            all of them
+       ./run bench NAME [NAME ...]  these
+       ./run bench NAME OPTIONS     one, its own way (--help lists its options)
+       ./run bench --list           what there is
+"""
+
+
+def say(message: str) -> None:
+    """Report progress, apart from a benchmark's own output."""
+    print(f"bench: {message}", file=sys.stderr, flush=True)
+
+
+def listing(runs: dict[str, dict[str, Any]]) -> str:
+    """Return a line for each benchmark: how long it took the last time, and what it measures."""
+    lines = []
+    for name in sorted(BENCHMARKS):
+        source = (FOLDER / f"bench_{name}.py").read_text("utf-8")
+        about = (ast.get_docstring(ast.parse(source)) or "").partition("\n")[0]
+        took = f"{runs[name]['minutes']} min" if name in runs else "-"
+        lines.append(f"{name:12} {'long' if BENCHMARKS[name].get('long') else '':5} {took:>9}  {about}")
+    return "\n".join(lines)
+
+
+def commit() -> str:
+    """Return the commit that is measured, with a `+` where its code was changed; empty outside a repository."""
+    git = ["git", "-C", str(FOLDER.parent)]
+    head = subprocess.run([*git, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False)
+    code = ("*.py", "*.yaml", "*.lock")  # not the pages, which benchmarks write
+    changed = subprocess.run([*git, "diff", "--quiet", "HEAD", "--", *code], capture_output=True, check=False)
+    return head.stdout.strip() + "+" * (changed.returncode == 1)
+
+
+def run(names: Sequence[str], options: Sequence[str] = ()) -> int:
+    """Run benchmarks in turn, go on after a failure, and name those that failed.
+
+    Returns:
+        0 where all succeeded, 1 where one failed, 130 where Ctrl-C ended the benchmark that ran.
+    """
+    interrupted: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _frame: interrupted.append(number))  # the benchmark gets it too
+    runs, measured, failed = summary.read_runs(), commit(), []
+    timed = [float(runs[name]["minutes"]) for name in names if name in runs]
+    say(f"{len(names)} to run; {len(timed)} of them took {sum(timed):.1f} minutes the last time")
+    for number, name in enumerate(names, 1):
+        before = f"{os.getloadavg()[0]:.1f}"
+        took = f"took {runs[name]['minutes']} min the last time" if name in runs else "not timed yet"
+        say(f"{number} of {len(names)}: {name}, load {before}; {took}")
+        began_s = time.monotonic()
+        code = subprocess.run([sys.executable, str(FOLDER / f"bench_{name}.py"), *options], check=False).returncode
+        minutes = f"{(time.monotonic() - began_s) / 60:.1f}"
+        if interrupted:
+            say(f"{name} was interrupted")
+            return 130
+        say(f"{name} {f'FAILED with exit code {code}' if code else 'is done'} after {minutes} min")
+        if code:
+            failed.append(name)
+        elif not options:
+            day = datetime.now(UTC).date().isoformat()
+            runs[name] = {"date": day, "commit": measured, "minutes": minutes, "load": before}
+            summary.RUNS.write_text(json.dumps(runs, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+        try:
+            summary.write()
+        except LookupError as error:
+            say(f"docs/benchmarks.md cannot be written: {error}")
+            failed.append(name)
+    if failed:
+        say(f"failed: {', '.join(dict.fromkeys(failed))}")
+    return 1 if failed else 0
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run what was asked for, or list what there is."""
+    if list(arguments) == ["--list"]:
+        print(listing(summary.read_runs()))
+        return 0
+    if not arguments or list(arguments) == ["--all"]:
+        return run([name for name in sorted(BENCHMARKS) if arguments or not BENCHMARKS[name].get("long")])
+    if set(arguments) <= set(BENCHMARKS):
+        return run(arguments)
+    if arguments[0] in BENCHMARKS:
+        return run(arguments[:1], arguments[1:])
+    print(USAGE, file=sys.stdout if arguments[0] in {"-h", "--help", "help"} else sys.stderr)
+    return 0 if arguments[0] in {"-h", "--help", "help"} else 2
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))
