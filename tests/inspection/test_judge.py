@@ -589,6 +589,8 @@ def every_trusted(at_2_mm2: float, at_4_mm2: float, doubtful_mm: tuple[float, ..
         (30, 60, (4,), Flag.CUT_BY_BORDER, "PASS", 4),
         (30, 98, (4,), Flag.CUT_BY_BORDER, "NO_RESULT", 4),
         (30, 60, (2, 4), Flag.CUT_BY_BORDER, "NO_RESULT", 4),
+        (30, 0, (4,), Flag.UNDECIDED, "NO_RESULT", 4),
+        (30, 20, (4,), Flag.LOW_CONFIDENCE, "NO_RESULT", 4),
     ],
 )
 def test_every_limit_whose_area_is_trusted_has_to_be_kept(at_2_mm2, at_4_mm2, doubtful_mm, flag, outcome, last_mm):
