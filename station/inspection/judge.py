@@ -178,8 +178,8 @@ def _case(press: Press, recipe: Recipe) -> "_Case":
         return last
     if recipe.damage.decided_by == "first_trusted":
         return decided[0]
-    # Every trusted one: the first that is not kept. An area that is not trusted at the last is still a lower bound, but
-    # for one that has fallen: then the steps contradict each other, and an earlier limit says nothing for the fruit.
+    # Every trusted one: the first that is not kept. An area that is not trusted at the last is still a lower bound,
+    # unless areas up to it do not rise: then the steps contradict each other, and an earlier limit passes no fruit.
     not_kept = next((case for case in decided if case.findings), None)
     return not_kept or (decided[-1] if last.reached and not last.near and not last.falls else last)
 

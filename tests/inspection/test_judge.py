@@ -589,14 +589,18 @@ def every_trusted(at_2_mm2: float, at_4_mm2: float, doubtful_mm: tuple[float, ..
         (30, 60, (4,), Flag.CUT_BY_BORDER, "PASS", 4),
         (30, 98, (4,), Flag.CUT_BY_BORDER, "NO_RESULT", 4),
         (30, 60, (2, 4), Flag.CUT_BY_BORDER, "NO_RESULT", 4),
-        (30, 0, (4,), Flag.UNDECIDED, "NO_RESULT", 4),
-        (30, 20, (4,), Flag.LOW_CONFIDENCE, "NO_RESULT", 4),
     ],
 )
 def test_every_limit_whose_area_is_trusted_has_to_be_kept(at_2_mm2, at_4_mm2, doubtful_mm, flag, outcome, last_mm):
     press = every_trusted(at_2_mm2, at_4_mm2, doubtful_mm, flag)
     verdict = judge(press, EVERY_TRUSTED)
     assert (verdict.outcome, press.points[-1].closing_mm) == (outcome, last_mm), verdict.findings
+
+
+@pytest.mark.parametrize(("last_mm2", "outcome"), [(0, "NO_RESULT"), (20, "NO_RESULT"), (60, "PASS")])
+def test_an_earlier_limit_passes_no_fruit_whose_area_does_not_rise_up_to_the_last(last_mm2, outcome):
+    points = (point(0.0, 4), point(1.0, 15), point(2.0, 30), point(4.0, last_mm2, Flag.UNDECIDED))
+    assert judge(Press(35.0, 0.4, points), EVERY_TRUSTED).outcome == outcome
 
 
 def test_a_recipe_says_when_not_every_limit_decides():
