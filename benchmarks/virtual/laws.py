@@ -78,17 +78,22 @@ class Laws:
             self._whole(passage.sequence, record.press)
 
     def _whole(self, sequence: int, press: Press | None) -> None:
-        """A PASS's press by a plain rule of its own, apart from the judge."""
+        """A PASS's press by a plain rule of its own, apart from the judge: a trusted area at the last limit, kept."""
         if press is None or press.interruptions or press.onset_mm is None:
             raise LawBrokenError(WHOLE_PRESS, f"sequence {sequence} was interrupted, or met nothing")
         last = self._recipe.damage.area[-1]
-        beyond = [point for point in press.points if point.closing_mm >= last.closing_mm - AT_MM]
         least = self._recipe.segmentation.robust.least_confidence
+        ordered = sorted(press.points, key=lambda point: point.closing_mm)
+        beyond = [point for point in ordered if point.closing_mm >= last.closing_mm - AT_MM]
         if not beyond:
             raise LawBrokenError(WHOLE_PRESS, f"sequence {sequence} ends before {last.closing_mm} mm")
-        at = min(beyond, key=lambda point: point.closing_mm)
-        if at.flags or (at.confidence or 0.0) < least or at.area_mm2 > last.area_mm2:
-            raise LawBrokenError(WHOLE_PRESS, f"sequence {sequence} passed by {at}")
+        after = beyond[0]
+        before = after if after.closing_mm <= last.closing_mm else ordered[-len(beyond) - 1]
+        share = (last.closing_mm - before.closing_mm) / ((after.closing_mm - before.closing_mm) or 1.0)
+        area_mm2 = before.area_mm2 + share * (after.area_mm2 - before.area_mm2)
+        doubtful = any(point.flags or (point.confidence or 0.0) < least for point in (before, after))
+        if doubtful or area_mm2 > last.area_mm2:
+            raise LawBrokenError(WHOLE_PRESS, f"sequence {sequence} passed by {area_mm2} mm², {before}, {after}")
 
     @staticmethod
     def cycle(before: State, event: Event, after: State, moving: Collection[str]) -> None:

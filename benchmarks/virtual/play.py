@@ -27,7 +27,7 @@ SCAN_S = 0.15
 _SETTLE_S = 400.0
 """For the line to come to rest after the last trouble; an alarm that chatters stays for a minute."""
 
-_LAST_FRUITS = 3
+LAST_FRUITS = 3
 """Sound ones after the last trouble: a line that runs again shows it by them."""
 
 
@@ -99,7 +99,7 @@ class _World:
         self._scan()
         self._play(self._story.fruits, self._story.calm_s + 30.0 * self._story.fruits + _SETTLE_S)
         self.clock.run(self._story.calm_s, lambda: False)
-        self._play(self._story.fruits + _LAST_FRUITS, self.clock.s + _SETTLE_S)
+        self._play(self._story.fruits + LAST_FRUITS, self.clock.s + _SETTLE_S)
         self.clock.run(self.clock.s + _SETTLE_S, self._is_at_rest)
         if not self._is_at_rest():
             alarms = self._machine.station.alarms.alarms.not_normal

@@ -21,7 +21,8 @@ from plc_interface.handshake.events import (
     WriterGranted,
     WriterWithdrawn,
 )
-from plc_interface.handshake.modes import Signal
+from plc_interface.handshake.modes import Result, Signal
+from plc_interface.handshake.results import take_unwritten
 from plc_interface.handshake.state import NO_SIZE, Size
 from plc_interface.handshake.work import Work
 
@@ -113,8 +114,10 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
             work.signals.append(on)
         elif bit in fell and off is not None:
             work.signals.append(off)
+    _apply_first_write(work, event)
     changed = event.inputs.acknowledged_sequence not in {before.acknowledged_sequence, 0}
-    left_high = seen is None and event.inputs.acknowledged_sequence == state.journal.acknowledged
+    had = {state.journal.acknowledged, state.taken or state.journal.acknowledged}
+    left_high = seen is None and event.inputs.acknowledged_sequence in had
     _acknowledged(work, event, rose, changed=changed, left_high=left_high)
     if "acknowledge" in fell:
         work.signals.append(Signal.ACKNOWLEDGE_OFF)
@@ -128,6 +131,13 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
 
 
 _BITS = frozenset({*(bit for bit, _, off in EDGES if off), "acknowledge", "execute_command", "trigger"})
+
+
+def _apply_first_write(work: Work, event: PlcWrote) -> None:
+    """Take what the PLC had taken before this start; a write of neither of its registers says nothing of that."""
+    if work.state.result is Result.WITHHELD and not event.written.isdisjoint({"acknowledged_sequence", "control"}):
+        take_unwritten(work, event.inputs.acknowledged_sequence)
+        work.signals.append(Signal.FIRST_WRITE)
 
 
 def _apply_size(work: Work, event: PlcWrote, *, by_trigger: bool) -> None:
@@ -161,7 +171,7 @@ def _acknowledged(work: Work, event: PlcWrote, rose: frozenset[str], *, changed:
         work.signals.append(Signal.ACKNOWLEDGED)
     elif after and sequence:
         work.signals.append(Signal.ACKNOWLEDGE_AFTER)
-    elif (by_bit and not left_high) or (changed and sequence != state.journal.acknowledged):
+    elif (by_bit and not left_high) or (changed and sequence not in {state.journal.acknowledged, state.taken}):
         work.signals.append(Signal.WRONG_ACKNOWLEDGEMENT)
 
 

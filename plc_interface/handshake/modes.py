@@ -57,6 +57,8 @@ class Inspection(StrEnum):
 class Result(StrEnum):
     """The result block and its acknowledgement."""
 
+    WITHHELD = "withheld"
+    """After a start: what the PLC has taken is in its first write, and may be missing in the journal."""
     EMPTY = "empty"
     PUBLISHED = "published"
     TAKEN = "taken"
@@ -95,6 +97,7 @@ class Signal(StrEnum):
     TRIGGER_HELD = "trigger still on after a reconnect"
     ACKNOWLEDGED = "sequence acknowledged"
     WRONG_ACKNOWLEDGEMENT = "another sequence acknowledged"
+    FIRST_WRITE = "first write after a start"
     ACKNOWLEDGE_AFTER = "acknowledge on for the sequence just taken"
     ACKNOWLEDGE_OFF = "acknowledge off"
     EXECUTE_ON = "execute on"

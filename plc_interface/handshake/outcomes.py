@@ -64,6 +64,10 @@ def queue(work: Work, outcome: Outcome) -> None:
     It stays in the journal until the station has noted it: the PLC may have taken it long before.
     """
     state = work.state
+    if outcome.sequence == state.taken:  # by the PLC, before this start
+        work.actions.append(NotifyPublished(outcome))
+        acknowledge(work, outcome.sequence)
+        return
     state.queue = (*state.queue, outcome)
     work.update_journal(verdicts=(*state.journal.verdicts, outcome)[-MOST_UNNOTED:])
     work.count(_COUNTED[outcome.outcome], *(("count_late",) if outcome.late else ()))

@@ -36,6 +36,22 @@ def take(work: Work) -> None:
     pass_over_hidden(work)
 
 
+def take_unwritten(work: Work, sequence: int) -> None:
+    """Take what the PLC had taken before a start, also where a full disk kept its acknowledgement from the journal.
+
+    Args:
+        work: the PLC's first write.
+        sequence: the one in it; what is not known yet is taken once the station reports it.
+    """
+    state = work.state
+    state.taken = sequence
+    if any(outcome.sequence == sequence for outcome in state.queue):
+        state.queue = tuple(outcome for outcome in state.queue if outcome.sequence > sequence)
+        state.unconfirmed = 0 if bit_is_high(work) else sequence
+        acknowledge(work, sequence)
+        pass_over_hidden(work)
+
+
 def watch(work: Work) -> None:
     """Start the acknowledge bit's time-out."""
     work.start(Signal.ACKNOWLEDGE_TIMEOUT, work.settings.handshake_timeout_s)
@@ -62,9 +78,14 @@ def wrong(work: Work) -> None:
     work.fault(Fault.WRONG_ACKNOWLEDGEMENT)
 
 
-EMPTY, PUBLISHED, TAKEN = Result.EMPTY, Result.PUBLISHED, Result.TAKEN
+WITHHELD, EMPTY, PUBLISHED, TAKEN = Result.WITHHELD, Result.EMPTY, Result.PUBLISHED, Result.TAKEN
 
 ROWS = (
+    row(WITHHELD, Signal.FIRST_WRITE, publish_oldest, to=PUBLISHED, when=one_waits),
+    row(WITHHELD, Signal.FIRST_WRITE, to=EMPTY),
+    row(WITHHELD, Signal.QUEUED),
+    row(WITHHELD, Signal.WRONG_ACKNOWLEDGEMENT, wrong),
+    row(WITHHELD, Signal.WRITER_LOST),
     row(EMPTY, Signal.QUEUED, publish_oldest, to=PUBLISHED),
     row(EMPTY, Signal.ACKNOWLEDGE_AFTER, watch, to=TAKEN),
     row(EMPTY, Signal.WRONG_ACKNOWLEDGEMENT, wrong),

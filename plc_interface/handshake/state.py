@@ -91,6 +91,8 @@ class State:
     inputs: Inputs = field(default_factory=Inputs)
     seen: frozenset[str] | None = None
     """The control bits at the writer's last write; None before its first one, when every bit is news."""
+    taken: int = 0
+    """The sequence in the first write after a start: the PLC had taken it, though the journal may not have it."""
     unconfirmed: int = 0
     """The sequence taken by its number alone; the bit may still follow."""
     size: Size = NO_SIZE
@@ -158,7 +160,8 @@ class State:
 def restarted(journal: Journal, at: Moment, station_lost_after_s: float) -> State:
     """Return the state at a start: disarmed, no state of the station, and the journal's content.
 
-    A pending trigger is refused.
+    A pending trigger is refused. No result is published before the PLC's first write, whose number of the last result
+    that it took is newer than a journal that could not be written.
 
     Args:
         journal: of the run before.
@@ -178,8 +181,7 @@ def restarted(journal: Journal, at: Moment, station_lost_after_s: float) -> Stat
         reset_utc_ms=at.utc_ms,
         journal=journal.model_copy(update=changes),
         queue=journal.queue,
-        result=Result.PUBLISHED if journal.queue else Result.EMPTY,
-        published=journal.queue[0].sequence if journal.queue else 0,
+        result=Result.WITHHELD,
     )
     if journal.asked_id is not None:
         state.last_refusal, state.last_refused_id, state.missed = Refusal.STATION_LOST, journal.asked_id, True

@@ -178,9 +178,10 @@ def _case(press: Press, recipe: Recipe) -> "_Case":
         return last
     if recipe.damage.decided_by == "first_trusted":
         return decided[0]
-    # Every trusted one: the first that is not kept. An area that is not trusted at the last is still a lower bound.
+    # Every trusted one: the first that is not kept. An area that is not trusted at the last is still a lower bound,
+    # unless areas up to it do not rise: then the steps contradict each other, and an earlier limit passes no fruit.
     not_kept = next((case for case in decided if case.findings), None)
-    return not_kept or (decided[-1] if last.reached and not last.near else last)
+    return not_kept or (decided[-1] if last.reached and not last.near and not last.falls else last)
 
 
 def _with_limit(recipe: Recipe, limit: AreaThreshold) -> Recipe:
@@ -214,6 +215,11 @@ class _Case:
     def near(self) -> bool:
         """Whether a limit may be passed, by whatever was measured."""
         return any(finding.reason is Reason.NEAR_LIMIT for finding in self.findings)
+
+    @property
+    def falls(self) -> bool:
+        """Whether the area does not rise as it has to, by whatever was measured."""
+        return any(finding.reason is Reason.AREA_NOT_RISING for finding in self.findings)
 
     @property
     def decides(self) -> bool:

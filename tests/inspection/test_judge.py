@@ -597,6 +597,12 @@ def test_every_limit_whose_area_is_trusted_has_to_be_kept(at_2_mm2, at_4_mm2, do
     assert (verdict.outcome, press.points[-1].closing_mm) == (outcome, last_mm), verdict.findings
 
 
+@pytest.mark.parametrize(("last_mm2", "outcome"), [(0, "NO_RESULT"), (20, "NO_RESULT"), (60, "PASS")])
+def test_an_earlier_limit_passes_no_fruit_whose_area_does_not_rise_up_to_the_last(last_mm2, outcome):
+    points = (point(0.0, 4), point(1.0, 15), point(2.0, 30), point(4.0, last_mm2, Flag.UNDECIDED))
+    assert judge(Press(35.0, 0.4, points), EVERY_TRUSTED).outcome == outcome
+
+
 def test_a_recipe_says_when_not_every_limit_decides():
     assert "decided_by" not in DECIDING.model_dump(mode="json")["damage"], "older recipes keep their content hash"
     recipes = (DECIDING, FIRST_TRUSTED, EVERY_TRUSTED)

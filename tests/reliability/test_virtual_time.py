@@ -9,6 +9,7 @@ import pytest
 from benchmarks.virtual import actions, interface, laws
 from benchmarks.virtual.play import play
 from benchmarks.virtual.story import Story, Trouble, draw, shrink
+from plc_interface.handshake import inputs
 from plc_interface.handshake.journal import Journal
 from station.inspection.cycle import TABLE, UNJUDGED, Action, Event, Transition
 from station.inspection.judge import Judgement
@@ -51,6 +52,25 @@ def test_a_connection_cut_and_made_again_within_a_scan_arms_again():
     assert report.broken is None, report.broken
 
 
+def test_an_acknowledgement_that_a_full_disk_kept_from_the_journal_doubles_no_outcome():
+    full = Trouble(part="disk", kind="full", at_s=57.112, lasts_s=0.234)
+    kill = Trouble(part="interface", kind="kill", at_s=57.344, lasts_s=0.743)
+    report = play(Story(seed=465, fruits=30, troubles=(full, kill), carries=False))
+    assert report.broken is None, report.broken
+
+
+def test_a_last_step_that_shows_nothing_passes_by_no_earlier_limit():
+    garbage = Trouble(part="camera", kind="garbage", at_s=2.329, lasts_s=5.306)
+    report = play(Story(seed=876, fruits=1, troubles=(garbage,), carries=True))
+    assert report.broken is None, report.broken
+
+
+def test_an_area_beyond_the_last_limits_closing_is_not_held_against_it():
+    wrong = Trouble(part="gripper", kind="wrong", at_s=32.26, lasts_s=0.26)
+    report = play(Story(seed=514, fruits=17, troubles=(wrong,), carries=False))
+    assert report.broken is None, report.broken
+
+
 def test_the_same_story_gives_the_same_play():
     one, other = play(draw(7, FRUITS)), play(draw(7, FRUITS))
     assert (one.decided, one.virtual_s, one.by_trouble) == (other.decided, other.virtual_s, other.by_trouble)
@@ -74,6 +94,7 @@ def test_an_outcome_that_is_shown_again_is_found(monkeypatch: pytest.MonkeyPatch
             save(self, journal)
 
     monkeypatch.setattr(interface.Interface, "_save", forgetful)
+    monkeypatch.setattr(inputs, "take_unwritten", lambda *_: None)
     least = found(laws.NONE_DOUBLED)
     assert len(least.troubles) <= 2
     assert "interface kill" in {trouble.name for trouble in least.troubles}

@@ -200,6 +200,44 @@ def test_a_trigger_that_a_restart_interrupts_is_refused_and_what_it_began_is_nev
     assert (again.state.queue, again.state.running, again.state.journal.acknowledged) == ((), None, 41)
 
 
+@pytest.mark.parametrize("linked_first", [True, False])
+@pytest.mark.parametrize("journal_of", ["queue", "running"])
+def test_an_acknowledgement_that_a_full_disk_kept_from_the_journal_is_in_the_first_write(
+    bench, journal_of, linked_first
+):
+    made = bench()
+    made.run()
+    running = made.state.journal
+    made.feed(ev.OutcomeReceived, made.outcome())
+    journal = made.state.journal if journal_of == "queue" else running
+    made.write("enable", "acknowledge", acknowledged_sequence=41)
+    again = bench(journal)
+    again.feed(ev.WriterGranted)
+    seen = [view(again.state)]
+    for links in (linked_first, not linked_first):
+        if links:
+            again.link(Open(running=None, outcomes=(made.outcome(),)))
+        else:
+            again.write("enable", acknowledged_sequence=41)
+        seen.append(view(again.state))
+    assert [each["result_sequence"] for each in seen] == [0, 0, 0]
+    assert (again.state.journal.acknowledged, again.state.queue, again.state.faults) == (41, (), ())
+    assert again.of(do.NotifyPublished)[0].outcome == made.outcome()
+    assert again.of(do.NotifyAcknowledged)[-1].sequence == 41
+
+
+def test_after_a_start_a_result_that_was_not_taken_is_published_with_the_first_write(bench):
+    made = bench()
+    made.run()
+    made.feed(ev.OutcomeReceived, made.outcome())
+    again = bench(made.state.journal)
+    again.feed(ev.WriterGranted)
+    again.feed(ev.PlcWrote, again.inputs, frozenset({"plc_heartbeat"}))
+    assert view(again.state)["result_sequence"] == 0
+    again.write("enable", acknowledged_sequence=40)
+    assert view(again.state)["result_sequence"] == 41
+
+
 def test_what_stands_is_told_once_the_station_is_back_and_no_timer_is_left(bench):
     made = bench()
     made.run()
@@ -215,6 +253,7 @@ def test_with_its_journal_lost_the_interface_takes_over_what_the_station_holds(b
     made.feed(ev.WriterGranted)
     ended = made.outcome("FAIL", Reason.AREA_OVER_LIMIT, sequence=40, trigger_id=6)
     made.link(Open(running=(41, 7), outcomes=(ended,)))
+    made.write()
     seen = view(made.state)
     assert (seen["result_sequence"], seen["result_trigger_id"], seen["accepted_trigger_id"]) == (40, 6, 7)
     assert [action.sequence for action in made.of(do.RequestOutcome)] == [41]

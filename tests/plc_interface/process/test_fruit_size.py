@@ -83,6 +83,7 @@ def test_the_outcome_of_a_fruit_whose_station_or_interface_died_has_its_size(cel
                 plc.close()
                 await made.start()
                 plc = await made.plc()
+                await plc.write(control=0)
             shown = await plc.wait("result_valid", "error", result_trigger_id=1)
             assert shown["result_reasons"] == {"station_lost"}
             return shown["result_fruit_length_mm_x10"], shown["result_size_class"]

@@ -324,6 +324,9 @@ def test_an_interface_that_is_killed_continues_where_it_was(cell, eventually):
             plc.close()
             await made.start()
             plc = await made.plc()
+            seen = await plc.wait("online", "inspecting", without="trigger_ready")
+            assert (seen["waiting_results"], seen["result_sequence"]) == (1, 0), "until the PLC says what it has taken"
+            await plc.write(acknowledged_sequence=101)
             seen = await plc.wait("online", "result_valid", "inspecting", without="trigger_ready")
             assert (seen["result_sequence"], seen["result_trigger_id"], seen["result_outcome"]) == (102, 2, "PASS")
             assert (seen["accepted_trigger_id"], seen["acknowledged_sequence_echo"]) == (3, 101)

@@ -251,7 +251,9 @@ class Laws:
 
     def _acknowledgement(self, event: ev.Event, before: State, after: State, *, due: bool) -> None:
         now_s = event.at.s
-        if after.queue and after.result is not Result.PUBLISHED:
+        if isinstance(event, ev.PlcWrote) and "control" in event.written:
+            assert after.result is not Result.WITHHELD, "the PLC has said what it has taken"
+        if after.queue and after.result not in {Result.PUBLISHED, Result.WITHHELD}:
             assert now_s < self.since_s.setdefault("waiting", now_s) + self.settings.handshake_timeout_s
         else:
             self.since_s.pop("waiting", None)
