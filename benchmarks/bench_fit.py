@@ -26,8 +26,8 @@ ROOT = Path(__file__).resolve().parents[1]
 COST = """
 The data sets have two parts: one to fit on, and one held back, on which nothing is chosen. Real presses and real
 backgrounds are split into even and odd numbers; the twin's presses have seeds of their own in each part. All images are
-at the method's working size. Border contacts and real presses are measured one by one; fruit and soft bodies are followed
-from step to step, from before the first touch.
+at the method's working size. Border contacts and real presses are measured one by one; fruit and soft bodies are
+followed from step to step, from before the first touch.
 
 | data set | what it shows |
 |---|---|
