@@ -147,7 +147,7 @@ def test_over_modbus_a_gripper_that_stands_still_is_a_time_out(on: OnWire):
         with pytest.raises(GripperTimeoutError):
             await moving
 
-    on("rtu over tcp", scenario)
+    on("rtu over tcp", scenario, move_margin_s=0.4)
 
 
 @pytest.mark.parametrize(("fault", "amount"), [("stuck", 1.0), ("wrong", 9.0), ("slow", 50.0)])
@@ -163,7 +163,7 @@ def test_what_answers_but_does_not_do_it_is_given_up_in_time(on_wire: OnWire, fa
         rig.faults.clear()
         assert (await rig.driver.move_to_width(45.0, 100.0, 20.0)).width_mm == pytest.approx(45.0, abs=0.2)
 
-    on_wire(scenario)
+    on_wire(scenario, move_margin_s=1.0)
 
 
 def test_garbage_is_told_from_silence(on_wire: OnWire):
@@ -179,7 +179,7 @@ def test_garbage_is_told_from_silence(on_wire: OnWire):
 
 def test_a_late_answer_is_silence_and_never_taken_for_the_next(on_wire: OnWire):
     async def scenario(rig: Any) -> None:
-        rig.faults.set("delayed", 0.75)
+        rig.faults.set("delayed", 3.0)
         with pytest.raises(GripperSilentError):
             await rig.driver.read()
         rig.faults.clear()
@@ -228,7 +228,7 @@ def test_a_link_cut_in_mid_move_is_an_error_at_once_and_nothing_moves_by_itself_
         assert (await rig.driver.read()).position_count == reading.position_count
         assert (await rig.driver.open()).reading.object_state == ObjectState.AT_POSITION
 
-    on_wire(scenario)
+    on_wire(scenario, answer_timeout_s=0.5)
 
 
 async def reached(rig: Any) -> Any:
@@ -253,7 +253,7 @@ def test_what_comes_and_goes_gives_errors_and_then_readings(on_wire: OnWire):
                 seen.add(False)
             await asyncio.sleep(0.01)
 
-    on_wire(scenario)
+    on_wire(scenario, answer_timeout_s=0.5)
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,9 @@ def inspected(bench, settings_file, tmp_path):
 
     def run(limit_mm2=None):
         file, place = settings_file(), tmp_path / "recipes" / "blueberry.yaml"
+        values = json.loads(file.read_text())
+        values["gripper"]["move_margin_s"] = 10.0
+        file.write_text(json.dumps(values))
         recipe = json.loads(place.read_text())
         recipe["steps"]["measured"] = "while_closing"
         if limit_mm2 is not None:
@@ -31,8 +34,20 @@ def inspected(bench, settings_file, tmp_path):
                 await cell.choose("blueberry")
                 cell.lay("blueberry", 1)
                 await cell.line.ready()
-                # So slow that a busy machine still measures frames on the way.
-                cell.at(State.MOVING, lambda: cell.twin.boards["gripper"].set("slow", 4.0))
+                boards = cell.twin.boards
+
+                def slowly():
+                    # A busy machine measures each frame before the next one, and before the fingers arrive.
+                    boards["gripper"].set("slow", 30.0)
+                    boards["camera"].set("slow", 5.0)
+                    cell.at(State.SETTLING, at_its_speed)
+
+                def at_its_speed():
+                    # Fingers that are still slow would be given up while they release the fruit.
+                    boards["gripper"].clear()
+                    boards["camera"].clear()
+
+                cell.at(State.MOVING, slowly)
                 outcome = await cell.line.inspect()
                 record = await cell.station.service.registry.records.inspection(outcome.sequence)
                 return outcome, record
