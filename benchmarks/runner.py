@@ -62,7 +62,7 @@ def run(names: Sequence[str], options: Sequence[str] = ()) -> int:
     signal.signal(signal.SIGINT, lambda number, _frame: interrupted.append(number))  # the benchmark gets it too
     runs, measured, failed = summary.read_runs(), commit(), []
     timed = [float(runs[name]["minutes"]) for name in names if name in runs]
-    say(f"{len(names)} to run; {len(timed)} of them took {sum(timed):.1f} minutes the last time")
+    say(f"{len(names)} to run; the {len(timed)} that were timed before took {sum(timed):.1f} min")
     for number, name in enumerate(names, 1):
         before = f"{os.getloadavg()[0]:.1f}"
         took = f"took {runs[name]['minutes']} min the last time" if name in runs else "not timed yet"

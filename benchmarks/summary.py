@@ -95,3 +95,7 @@ def read_runs() -> dict[str, dict[str, Any]]:
 def write() -> None:
     """Renew `docs/benchmarks.md`."""
     DOCUMENT.write_text(markdown(read_runs()), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write()

@@ -22,7 +22,9 @@ average of 1.5.
 
 
 def test_the_page_is_what_the_benchmarks_pages_say_now():
-    assert summary.DOCUMENT.read_text("utf-8") == summary.markdown(summary.read_runs()), "run: ./run bench NAME"
+    assert summary.DOCUMENT.read_text("utf-8") == summary.markdown(summary.read_runs()), (
+        "renew it: .venv/bin/python -m benchmarks.summary"
+    )
 
 
 def test_every_benchmark_is_in_the_table(root):

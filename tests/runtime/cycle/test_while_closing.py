@@ -37,7 +37,7 @@ def inspected(bench, settings_file, tmp_path):
                 boards = cell.twin.boards
 
                 def slowly():
-                    # Fingers and camera: so a busy machine too measures each frame before the next one.
+                    # A busy machine measures each frame before the next one, and before the fingers arrive.
                     boards["gripper"].set("slow", 30.0)
                     boards["camera"].set("slow", 5.0)
                     cell.at(State.SETTLING, at_its_speed)
