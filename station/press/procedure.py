@@ -111,18 +111,19 @@ async def back_off(rig: Rig, met: Met) -> Position:
     return await rig.open(min(from_mm, rig.widest_mm))
 
 
-async def onset(rig: Rig, recipe: Recipe, opened: Position, measure: Measure) -> Onset:
+async def onset(rig: Rig, recipe: Recipe, opened: Position, measure: Measure, lowest_mm: float | None = None) -> Onset:
     """Find the onset as finely as the fingers can, from where nothing touches.
 
     The onset's width is what every closing is counted from.
 
     Args:
         opened: where the fingers have backed off to; they open further while something touches.
+        lowest_mm: where the search ends in any case; None for the recipe's smallest width.
 
     Raises:
         NothingTouchedError, UnseenContactError: as `sweep`.
     """
-    search = _Search(rig, recipe, stop.lowest_mm(recipe), measure)
+    search = _Search(rig, recipe, stop.lowest_mm(recipe) if lowest_mm is None else lowest_mm, measure)
     from_mm = opened.width_mm
     while True:  # back to where nothing touches, however faintly it began
         # From the measured width: asked for from between two counts, a finest step may be two counts.
@@ -131,6 +132,23 @@ async def onset(rig: Rig, recipe: Recipe, opened: Position, measure: Measure) ->
             return await search.confirmed(met_mm, before, touching)
         from_mm += recipe.steps.step_mm
         opened = await rig.open(min(from_mm, rig.widest_mm))
+
+
+async def onset_again(rig: MovingRig, recipe: Recipe, met: Met, measure: Measure) -> Onset:
+    """Find the onset of a fruit that was met before, from beside where it was; sweep where it is no longer there.
+
+    Args:
+        met: where it was met.
+
+    Raises:
+        NothingTouchedError, UnseenContactError: as `sweep`.
+    """
+    opened = await rig.close_to(met.width_mm if met.clear_mm is None else met.clear_mm)
+    try:
+        # One step further in: from there on a sweep is quicker than count by count.
+        return await onset(rig, recipe, opened, measure, met.width_mm - recipe.steps.step_mm)
+    except stop.NothingTouchedError:
+        return await onset(rig, recipe, await back_off(rig, await sweep(rig, recipe, measure)), measure)
 
 
 async def onset_from(rig: Rig, recipe: Recipe, from_mm: float, lowest_mm: float, measure: Measure) -> Onset:

@@ -13,8 +13,8 @@ from station.devices.gripper.errors import GripperStoppedError
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
 from station.messages import gripper as gripper_messages
 from station.press import motion
-from station.press.motion import close_on, sweep
-from station.press.procedure import back_off, onset
+from station.press.motion import Met, close_on, sweep
+from station.press.procedure import back_off, onset, onset_again
 from station.press.stop import MOST_UNSEEN_MM, NothingTouchedError, UnseenContactError
 from station.runtime.devices import rig as rig_module
 from station.runtime.devices.rig import Cell, DeviceRig
@@ -120,6 +120,30 @@ def test_the_fingers_close_on_until_a_frame_shows_a_contact_and_each_frame_has_i
         assert before is not None
         assert before.move.width_mm >= 15.3 > start.step.move.width_mm
         assert before.move.width_mm - start.step.move.width_mm == pytest.approx(0.4)
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(("fruit_mm", "sweeps"), [(17.3, 0), (17.9, 0), (16.5, 0), (14.0, 1)])
+def test_a_fruit_that_was_met_before_is_searched_from_beside_it_and_swept_for_where_it_has_gone(cell, fruit_mm, sweeps):
+    async def scenario():
+        fingers, rig, measure = cell(fruit_mm)
+        await fingers.open(19.3)
+        before, start = await onset_again(rig, BLUEBERRY, Met(17.1, 17.5), measure)
+        assert fingers.stops == sweeps
+        assert before is not None
+        assert before.move.width_mm >= fruit_mm > start.step.move.width_mm
+        assert before.move.width_mm - start.step.move.width_mm == pytest.approx(0.4)
+
+    asyncio.run(scenario())
+
+
+def test_a_fruit_that_was_met_before_and_is_gone_is_not_touched(cell):
+    async def scenario():
+        fingers, rig, measure = cell(0.0)
+        await fingers.open(19.3)
+        with pytest.raises(NothingTouchedError):
+            await onset_again(rig, BLUEBERRY, Met(17.1, 17.5), measure)
 
     asyncio.run(scenario())
 

@@ -18,7 +18,7 @@ from station.messages import operation as messages
 from station.messages.message import Message, message_of
 from station.press import stop
 from station.press.motion import Met, close_on, sweep
-from station.press.procedure import back_off, onset, take_step
+from station.press.procedure import back_off, onset, onset_again, take_step
 from station.press.reference import ALARMS, BadReferenceError, JawsNotOpenError, are_open, open_jaws
 from station.press.rig import MeasuredStep, Position, Step
 from station.records.model import Image
@@ -158,6 +158,9 @@ class Inspector:
         try:
             if plan.start_width_mm is not None:
                 first = await self._vision.measure(await take_step(rig, recipe, 0, plan.start_width_mm))
+            elif now.met_mm is not None:
+                before, first = await onset_again(rig, recipe, Met(now.met_mm, now.clear_mm), self._seen)
+                now.before_onset_mm = None if before is None else before.move.width_mm
             else:
                 met = await sweep(rig, recipe, self._seen)
                 stopped = await rig.read()
@@ -165,7 +168,7 @@ class Inspector:
                 opened, off = await self._backed_off(now, rig, met, stopped)
                 if self._sets_out(now, off):
                     now.closings = 1
-                    now.let_go(met.width_mm)
+                    now.let_go(met.width_mm, opened.width_mm)
                     return Event.OFF_MIDDLE
                 before, first = await onset(rig, recipe, opened, self._seen)
                 now.before_onset_mm = None if before is None else before.move.width_mm
@@ -177,7 +180,7 @@ class Inspector:
         now.closings += 1
         off = self._off_middle(now, now.seen[-1])
         if plan.start_width_mm is not None and now.closings == 1 and self._sets_out(now, off):
-            now.let_go(first.step.move.width_mm)
+            now.let_go(first.step.move.width_mm, None)
             return Event.OFF_MIDDLE
         if now.moved != NOT_MOVED and off is not None:
             now.measures["left_off_mm"] = round(off.length_mm, 2)
@@ -187,14 +190,12 @@ class Inspector:
     async def _backed_off(self, now: Inspection, rig: DeviceRig, met: Met, at: Position) -> tuple[Position, Way | None]:
         """Open to where nothing touched, and say how far the first contact was off the field's middle.
 
-        The way is None after the first closing, and where there was no contact any more.
+        The way is None where there was no contact any more.
 
         Args:
             met: where the sweep has met the fruit.
             at: where the fingers came to rest.
         """
-        if now.closings:
-            return await back_off(rig, met), None
         # Measured while the jaws open: they do so whatever it shows.
         measuring = asyncio.ensure_future(self._vision.measure(Step(-1, at, await rig.frames(1))))
         try:

@@ -50,6 +50,8 @@ class Inspection:
     """The last width at which nothing touched."""
     met_mm: float | None = None
     """The width at which an earlier closing met the fruit; None in the first."""
+    clear_mm: float | None = None
+    """The width beside it at which nothing touched then; None where there was none."""
     closings: int = 0
     """How often the jaws have closed on the fruit."""
     moved: Way = NOT_MOVED
@@ -124,15 +126,16 @@ class Inspection:
         self.first_verdict = self.verdict
         self.earlier.append(self._latest())
         self.verdict = None
-        self.let_go(self.onset_mm)
+        self.let_go(self.onset_mm, self.before_onset_mm)
 
-    def let_go(self, met_mm: float | None) -> None:
+    def let_go(self, met_mm: float | None, clear_mm: float | None) -> None:
         """Begin another closing: what this one has shown is done with.
 
         Args:
             met_mm: the width at which this closing met the fruit.
+            clear_mm: the width beside it at which nothing touched; None where there was none.
         """
-        self.met_mm, self.before_onset_mm, self.closed_steps = met_mm, None, 0
+        self.met_mm, self.clear_mm, self.before_onset_mm, self.closed_steps = met_mm, clear_mm, None, 0
         self.steps.clear()
         self.seen.clear()
 

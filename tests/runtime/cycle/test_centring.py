@@ -6,12 +6,23 @@ import pytest
 
 from station.channel.line import CommandName
 from station.inspection.states import State
+from station.press import motion, procedure
+from station.runtime.cycle import actions
 
 FRUIT, RIGHT_MM, DOWN_MM = 16, 1.0, 0.8
 
 
 @pytest.mark.timeout(300)
-def test_the_arm_follows_the_first_contact_and_the_fruit_that_the_border_cut_passes(bench, roomy):
+def test_the_arm_follows_the_first_contact_and_the_fruit_that_the_border_cut_passes(bench, roomy, monkeypatch):
+    sweeps = []
+
+    def swept(*arguments):
+        sweeps.append(arguments)
+        return motion.sweep(*arguments)
+
+    monkeypatch.setattr(actions, "sweep", swept)
+    monkeypatch.setattr(procedure, "sweep", swept)
+
     async def scenario():
         async with bench(roomy(bench=False)) as cell:
             assert (await cell.line.order(CommandName.CHANGE_RECIPE, 1)).done
@@ -34,5 +45,6 @@ def test_the_arm_follows_the_first_contact_and_the_fruit_that_the_border_cut_pas
     assert (measures["off_right_mm"], measures["off_down_mm"]) == pytest.approx((RIGHT_MM, DOWN_MM), abs=0.4)
     assert sensor_mm == pytest.approx((measures["moved_right_mm"], measures["moved_down_mm"]), abs=0.03)
     assert measures["left_off_mm"] < 0.6
+    assert len(sweeps) == 1, "where it was met, the fruit is not searched once more"
     assert {"opening_again", "centring"} <= set(judged.phases_s)
     assert at_last is None, "the arm waits above the nest again"
