@@ -76,7 +76,6 @@ def played(seed: int) -> Result:
         "virtual_s": report.virtual_s,
         "took_s": time.monotonic() - began_s,
         "cpu_s": time.process_time() - began_cpu_s,
-        "process": os.getpid(),
         "code": code(),
         "most_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         "broken": None if broken is None else [broken.law, str(broken), str(least(story, broken.law))],

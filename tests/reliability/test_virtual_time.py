@@ -46,28 +46,24 @@ def test_laws_hold_over_a_thousand_triggers():
     assert triggers >= STORIES * FRUITS
 
 
-def test_a_connection_cut_and_made_again_within_a_scan_arms_again():
-    cut = Trouble(part="plc", kind="reconnect", at_s=138.672, lasts_s=1.408)
-    report = play(Story(seed=101, fruits=44, troubles=(cut,), carries=True))
-    assert report.broken is None, report.broken
-
-
-def test_an_acknowledgement_that_a_full_disk_kept_from_the_journal_doubles_no_outcome():
-    full = Trouble(part="disk", kind="full", at_s=57.112, lasts_s=0.234)
-    kill = Trouble(part="interface", kind="kill", at_s=57.344, lasts_s=0.743)
-    report = play(Story(seed=465, fruits=30, troubles=(full, kill), carries=False))
-    assert report.broken is None, report.broken
-
-
-def test_a_last_step_that_shows_nothing_passes_by_no_earlier_limit():
-    garbage = Trouble(part="camera", kind="garbage", at_s=2.329, lasts_s=5.306)
-    report = play(Story(seed=876, fruits=1, troubles=(garbage,), carries=True))
-    assert report.broken is None, report.broken
-
-
-def test_an_area_beyond_the_last_limits_closing_is_not_held_against_it():
-    wrong = Trouble(part="gripper", kind="wrong", at_s=32.26, lasts_s=0.26)
-    report = play(Story(seed=514, fruits=17, troubles=(wrong,), carries=False))
+@pytest.mark.parametrize(
+    ("seed", "fruits", "carries", "troubles"),
+    [
+        (101, 44, True, [("plc", "reconnect", 138.672, 1.408)]),
+        (465, 30, False, [("disk", "full", 57.112, 0.234), ("interface", "kill", 57.344, 0.743)]),
+        (876, 1, True, [("camera", "garbage", 2.329, 5.306)]),
+        (514, 17, False, [("gripper", "wrong", 32.26, 0.26)]),
+    ],
+    ids=[
+        "a connection cut and made again within a scan arms again",
+        "an acknowledgement that a full disk kept from the journal doubles no outcome",
+        "a last step that shows nothing passes by no earlier limit",
+        "an area beyond the last limit's closing is not held against it",
+    ],
+)
+def test_a_story_that_broke_a_law_holds_them_now(seed, fruits, carries, troubles):
+    drawn = tuple(Trouble(part=part, kind=kind, at_s=at_s, lasts_s=s) for part, kind, at_s, s in troubles)
+    report = play(Story(seed=seed, fruits=fruits, troubles=drawn, carries=carries))
     assert report.broken is None, report.broken
 
 
