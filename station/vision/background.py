@@ -126,7 +126,7 @@ class BackgroundModel:
         samples -= expected_levels
         trust = weight = resized(first_guess, self._grid).ravel()
         # The less background there is, the more of a contact's own slopes the shapes could explain.
-        known = float(np.clip(weight.mean() / p.known_share, _LEAST_KNOWN, 1))
+        known = min(max(float(weight.mean()) / p.known_share, _LEAST_KNOWN), 1.0)
         ridge = self._ridge / known**3
         spread = p.most_spread / 2
         change = np.zeros_like(expected)

@@ -52,7 +52,7 @@ def body_candidates(moved: Movement, threshold: float, constants: Constants) -> 
     strong = level[curvature > min(threshold, _STRONG_SHARE * strongest)]
     lowest = max(_OVER_SPREAD * seen.spread(moved), constants.candidate_share * quantile(strong, _LOW_QUANTILE))
     standing_out = ((level > lowest) | (curvature > threshold)).astype(np.uint8)
-    found = [part for part in _parts(standing_out) if curvature[part > 0].max() > threshold]
+    found = [part for part in _parts(standing_out) if cv2.minMaxLoc(curvature, part)[1] > threshold]
     return Candidates(_heaviest_first(level, found), level)
 
 
@@ -101,6 +101,8 @@ def separate_candidates(curvature: FloatImage, threshold: float) -> Candidates:
 
 
 def _heaviest_first(weight: FloatImage, regions: list[Mask]) -> list[Mask]:
+    if len(regions) < 2:
+        return regions
     return sorted(regions, key=lambda region: -float(weight[region > 0].sum()))
 
 

@@ -191,12 +191,16 @@ def _mirrored(region: Mask, constants: Constants) -> tuple[int, int, int, int]:
     """
     _, _, width, height = cv2.boundingRect(region)
     sides = ((width, region[:, 0]), (height, region[0]), (width, region[:, -1]), (height, region[-1]))
-    chords = np.array([np.count_nonzero(side) for _, side in sides]) / (height, width, height, width)
-    if (np.minimum(chords, np.roll(chords, 2)) > 0).any():
+    lengths = (height, width, height, width)
+    chords = [np.count_nonzero(side) / length for (_, side), length in zip(sides, lengths, strict=True)]
+    if min(chords[0], chords[2]) > 0 or min(chords[1], chords[3]) > 0:
         return 0, 0, 0, 0
-    in_corner = np.maximum(np.roll(chords, 1), np.roll(chords, -1)) > constants.corner_chord
-    near = chords > np.where(in_corner, constants.corner_chord, constants.border_chord)
-    left, top, right, bottom = (across if one else 0 for (across, _), one in zip(sides, near, strict=True))
+    found = [0, 0, 0, 0]
+    for number, (across, _) in enumerate(sides):
+        in_corner = max(chords[number - 1], chords[(number + 1) % 4]) > constants.corner_chord
+        if chords[number] > (constants.corner_chord if in_corner else constants.border_chord):
+            found[number] = across
+    left, top, right, bottom = found
     return left, top, right, bottom
 
 

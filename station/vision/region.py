@@ -134,7 +134,7 @@ def find_region(
     """
     p = constants
     shape = (start.shape[0], start.shape[1])
-    mask, share, coherence = start, p.candidate_share, 0.0
+    mask, share, coherence, agreed = start, p.candidate_share, 0.0, 0.0
     halved = _halved(moved)
     inner = _inner_hull(start, p.hull_share)
     if floor is not None:
@@ -175,7 +175,9 @@ def find_region(
             return None
     is_known = moved.share >= p.known_share / 2
     if texture is None:
-        texture = (_is_skin if is_known else _is_skin_by_curvature)(moved, halved, mask, p)
+        texture = (
+            _is_skin(moved, halved, mask, agreed, p) if is_known else _is_skin_by_curvature(moved, halved, mask, p)
+        )
     if texture and not is_known:
         mask, radii = _curved(moved, mask, rays, radii, p)
         if floor is not None:
@@ -205,9 +207,11 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
     return (curved, curved_radii) if curved.any() else (region, radii)
 
 
-def _is_skin(moved: Movement, halved: Movement, region: Mask, constants: Constants) -> bool:
+def _is_skin(moved: Movement, halved: Movement, region: Mask, agreed: float, constants: Constants) -> bool:
     """Whether the change turns from place to place; the larger the body, the more places there are to disagree."""
     p, radius = constants, radius_of(region)
+    if agreed >= p.smooth_small:  # with the places that have moved least: no skin agrees as much
+        return False
     smooth = min(p.smooth_small, p.smooth_at_one - p.smooth_per_size * float(np.log(radius)))
     return _coherence(moved, halved, region, p.coherence_window * radius, p.skin_left_out) < smooth
 

@@ -104,6 +104,8 @@ class State:
     moved: Movement = field(init=False)
     threshold: float = field(init=False)
     """The detection threshold of the curvature, grey levels per pixel."""
+    gate: float = field(init=False)
+    """The strongest curvature over the detection threshold."""
     changed: Mask = field(init=False)
     """The witness, at half the working size, 0 or 1."""
     floor: Mask | None = None
@@ -120,11 +122,6 @@ class State:
     confidence: float = 0.0
     agreed: float = 1.0
     """How far the step's frames agree, 0 to 1."""
-
-    @property
-    def gate(self) -> float:
-        """The strongest curvature over the detection threshold."""
-        return float(self.moved.curvature.max()) / self.threshold
 
 
 class RobustMethod:
@@ -172,6 +169,7 @@ class RobustMethod:
         light = clipped(self._reference)
         height, width = light.shape[:2]
         self._half = (-(-width // 2), -(-height // 2))
+        self._quarter = (-(-self._half[0] // 2), -(-self._half[1] // 2))
         self._light = resized(light, self._half)
         self._check = ReferenceCheck(self._light)
         self._light_levels = float(np.sqrt(np.mean(self._light**2)))
@@ -181,6 +179,7 @@ class RobustMethod:
         means = np.asarray(cv2.mean(light)[:3])
         lit = np.asarray(means > constants.lit_share * means.max())  # a dead LED's colour adds nothing to what curves
         self._debris = Debris(light)
+        self._clean = resized(self._debris.clean, self._quarter)
         # The detector needs the mean of the references: a median's noise is not that of the frames.
         halves = [resized(clipped(working_image(one)), self._half) for one in references]
         mean = np.asarray(np.mean(halves, axis=0), np.float32)
@@ -286,8 +285,7 @@ class RobustMethod:
         )
         before = state.before
         if state.floor is not None:
-            size = (state.calm.shape[1], state.calm.shape[0])
-            state.calm *= 1 - resized(state.floor.astype(np.float32), size)
+            state.calm *= 1 - resized(state.floor.astype(np.float32), self._quarter)
         state.background = self._model.fit(state.quarter, state.calm, None if before is None else before.coefficients)
         if "background" not in self._without:
             state.difference -= state.background.levels
@@ -297,8 +295,7 @@ class RobustMethod:
         """Take rows' and columns' noise off, by the places without contact."""
         if "destriping" in self._without:
             return
-        size = (state.calm.shape[1], state.calm.shape[0])
-        trusted = state.calm * resized(self._debris.clean, size)
+        trusted = state.calm * self._clean
         state.difference = destriped(state.difference, trusted, self._constants)
 
     def _bridge_debris(self, state: State) -> None:
@@ -313,8 +310,10 @@ class RobustMethod:
         state.threshold = max(self._parameters.gate_ratio * noise, self._least_curvature)
         state.moved = movement(state.difference, state.background, self._flat_field, response)
         # A large smooth body curves the gel evenly and leaves its halo for background.
-        if response.max() <= state.threshold and has_moved_widely(state.moved, self._constants):
+        strongest = float(response.max())
+        if strongest <= state.threshold and has_moved_widely(state.moved, self._constants):
             state.threshold *= self._constants.wide_threshold
+        state.gate = strongest / state.threshold
 
     def _see_what_changed(self, state: State) -> None:
         """Find where the image has changed at all, contact or halo."""
@@ -322,8 +321,7 @@ class RobustMethod:
 
     def _follow(self, state: State) -> None:
         """Take over what was in contact at the last trusted step; once the body has been let go the press is over."""
-        width, height = self._half
-        state.quarter = resized(state.difference, (-(-width // 2), -(-height // 2)))
+        state.quarter = resized(state.difference, self._quarter)
         state.load_levels = float(np.sqrt(np.mean(np.square(state.quarter))))
         before = state.before
         if before is None or before.floor is None or self._parameters.contacts == "several":
@@ -420,7 +418,7 @@ class RobustMethod:
         """Return at least what the step before did where no edge is trusted: compression only rises."""
         before, least = state.before, self._parameters.least_confidence
         state.confidence = self._outlines_confidence(state)
-        if before is None or not before.least.any() or self._parameters.contacts == "several":
+        if before is None or not cv2.countNonZero(before.least) or self._parameters.contacts == "several":
             return
         if state.confidence >= least or state.load_levels < self._constants.released_share * before.load_levels:
             return
@@ -520,7 +518,7 @@ class RobustMethod:
         return self._weak.response(state.frame)
 
     def _trace(self, state: State) -> Trace | None:
-        if not state.mask.any():
+        if not cv2.countNonZero(state.mask):
             return None
         # A press begins with its first contact: what drifted before says little about its light.
         if not state.outlines and state.floor is None:
