@@ -102,8 +102,7 @@ class Interface:
         self._wake_when_due()
 
     def _save(self, journal: Journal) -> None:
-        if self._machine.devices.trouble("disk") != "full":
-            self._machine.journal = journal
+        self._machine.journal = journal  # on a full disk too: it has a reserve
         if journal.highest != self._highest:
             self._highest = journal.highest
             self._machine.laws.accepted(journal.highest)

@@ -1,8 +1,10 @@
 """Journal file of the handshake."""
 
 import contextlib
+import errno
 import fcntl
 import logging
+import os
 import time
 from pathlib import Path
 
@@ -16,9 +18,18 @@ from station.messages.message import Message
 
 log = logging.getLogger(__name__)
 
+_RESERVE_BYTES = 1 << 20
+"""Twenty of the largest journals: 64 outcomes that the station has not noted take about 50 kB."""
+_BLOCK_BYTES = 4096
+"""A file system's; the reserve is given up in such pieces, so that whoever fills the disk gets nothing of it."""
+
 
 class JournalFile:
-    """One file that is replaced as a whole, and a lock that excludes a second interface."""
+    """One file that is replaced as a whole, a reserve of space for it, and a lock that excludes a second interface.
+
+    A full disk must not keep an outcome from the journal that the PLC is about to see: after a kill another one could
+    take its place. So some of the reserve is given up then, and taken again once there is space.
+    """
 
     def __init__(self, folder: Path) -> None:
         """Create the folder and take the lock.
@@ -31,6 +42,7 @@ class JournalFile:
         """
         self._folder = folder
         self._path = folder / "journal.json"
+        self._reserve = folder / "reserve"
         self.trouble: Message | None = None
         """Error of the last write."""
         try:
@@ -43,6 +55,7 @@ class JournalFile:
         except BlockingIOError as error:
             self._lock.close()
             raise BadInputError(messages.ANOTHER_INTERFACE(folder=str(folder))) from error
+        self._take_reserve()
 
     def read(self) -> Journal:
         """Return the last journal; an empty one if there is none, or none that can be read."""
@@ -69,7 +82,7 @@ class JournalFile:
             durable: wait for the disk, so that it outlives a loss of power too.
         """
         try:
-            write_atomically(self._path, journal.model_dump_json().encode(), durable=durable)
+            self._replace(journal.model_dump_json().encode(), durable=durable)
         except OSError as error:
             trouble = messages.JOURNAL_NOT_WRITTEN(file=str(self._path), error=str(error.strerror))
             if trouble != self.trouble:
@@ -77,7 +90,33 @@ class JournalFile:
             self.trouble = trouble
         else:
             self.trouble = None
+            self._take_reserve()
 
     def close(self) -> None:
         """Release the lock. Idempotent."""
         self._lock.close()
+
+    def _replace(self, data: bytes, *, durable: bool) -> None:
+        while True:
+            try:
+                write_atomically(self._path, data, durable=durable)
+            except OSError as error:
+                if error.errno not in {errno.ENOSPC, errno.EDQUOT} or not self._shrink_reserve():
+                    raise
+            else:
+                return
+
+    def _shrink_reserve(self) -> bool:
+        """Give up some of the reserve; False where none is left."""
+        try:
+            size = self._reserve.stat().st_size
+            os.truncate(self._reserve, max(0, size - _BLOCK_BYTES))
+        except OSError:
+            return False
+        return size > 0
+
+    def _take_reserve(self) -> None:
+        """Take what is missing of the reserve, as far as there is space."""
+        with contextlib.suppress(OSError), self._reserve.open("ab") as file:
+            for size in range(file.tell() + _BLOCK_BYTES, _RESERVE_BYTES + 1, _BLOCK_BYTES):
+                os.posix_fallocate(file.fileno(), 0, size)

@@ -50,21 +50,43 @@ def test_laws_hold_over_a_thousand_triggers():
     ("seed", "fruits", "carries", "troubles"),
     [
         (101, 44, True, [("plc", "reconnect", 138.672, 1.408)]),
-        (465, 30, False, [("disk", "full", 57.112, 0.234), ("interface", "kill", 57.344, 0.743)]),
         (876, 1, True, [("camera", "garbage", 2.329, 5.306)]),
         (514, 17, False, [("gripper", "wrong", 32.26, 0.26)]),
+        (
+            28554,
+            41,
+            True,
+            [("disk", "full", 77.789, 8.463), ("station", "kill", 82.519, 1.353), ("interface", "kill", 83.795, 0.391)],
+        ),
     ],
     ids=[
         "a connection cut and made again within a scan arms again",
-        "an acknowledgement that a full disk kept from the journal doubles no outcome",
         "a last step that shows nothing passes by no earlier limit",
         "an area beyond the last limit's closing is not held against it",
+        "an outcome of the interface's own that a full disk kept from the journal is not made anew",
     ],
 )
 def test_a_story_that_broke_a_law_holds_them_now(seed, fruits, carries, troubles):
     drawn = tuple(Trouble(part=part, kind=kind, at_s=at_s, lasts_s=s) for part, kind, at_s, s in troubles)
     report = play(Story(seed=seed, fruits=fruits, troubles=drawn, carries=carries))
     assert report.broken is None, report.broken
+
+
+def test_an_acknowledgement_that_the_journal_lacks_doubles_no_outcome(monkeypatch: pytest.MonkeyPatch):
+    """Story 465, as found: then the journal had no reserve on a full disk."""
+    save = interface.Interface._save
+
+    def refused(self: interface.Interface, journal: Journal) -> None:
+        if self._machine.devices.trouble("disk") != "full":
+            save(self, journal)
+
+    monkeypatch.setattr(interface.Interface, "_save", refused)
+    troubles = (Trouble("disk", "full", 57.112, 0.234), Trouble("interface", "kill", 57.344, 0.743))
+    assert play(Story(seed=465, fruits=30, troubles=troubles, carries=False)).broken is None
+    monkeypatch.setattr(inputs, "take_unwritten", lambda *_: None)
+    broken = play(Story(seed=465, fruits=30, troubles=troubles, carries=False)).broken
+    assert broken is not None
+    assert broken.law == laws.NONE_DOUBLED
 
 
 def test_the_same_story_gives_the_same_play():

@@ -1,5 +1,10 @@
 """The journal on the disk."""
 
+import contextlib
+import errno
+import os
+from pathlib import Path
+
 import pytest
 
 from plc_interface.handshake.journal import Journal
@@ -45,6 +50,45 @@ def test_a_disk_that_refuses_is_said_and_the_line_goes_on(tmp_path):
     file.write(Journal(), durable=False)
     assert file.trouble is None
     file.close()
+
+
+def test_a_full_disk_takes_the_journal_all_the_same(small_disk):
+    with contextlib.closing(JournalFile(small_disk / "plc")) as file:
+        for highest in range(1, 40):
+            fill(small_disk / "filler")
+            file.write(Journal(highest=highest), durable=True)
+            assert file.trouble is None
+            assert file.read().highest == highest
+        (small_disk / "plc" / "reserve").write_bytes(b"")
+        fill(small_disk / "filler")
+        file.write(Journal(highest=40), durable=True)
+        assert file.trouble is not None, "disk and reserve are full"
+        assert file.read().highest == 39
+        (small_disk / "filler").unlink()
+        file.write(Journal(highest=41), durable=True)
+        fill(small_disk / "filler")
+        file.write(Journal(highest=42), durable=True)
+        assert file.read().highest == 42, "the reserve was taken again"
+
+
+def test_a_disk_that_fails_otherwise_keeps_the_reserve(tmp_path, monkeypatch):
+    file = JournalFile(tmp_path)
+
+    def fails(*_: object, **__: object) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr("plc_interface.process.journal_file.write_atomically", fails)
+    file.write(Journal(), durable=True)
+    assert file.trouble is not None
+    assert (tmp_path / "reserve").stat().st_size == 1 << 20
+    file.close()
+
+
+def fill(path: Path) -> None:
+    """Take all the space that is left."""
+    with contextlib.suppress(OSError), path.open("ab", buffering=0) as file:
+        while True:
+            file.write(bytes(4096))
 
 
 def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path):
