@@ -172,7 +172,7 @@ def other_units(backgrounds: list[Image]) -> list[PressData]:
     return found
 
 
-def untouched_twin(seed: int, units: int = 6) -> list[PressData]:
+def untouched_twin(seed: int, units: int = 24) -> list[PressData]:
     """Untouched units of the twin as they drift away from their reference, in four conditions."""
     found: list[PressData] = []
     for unit in range(seed, seed + units):
