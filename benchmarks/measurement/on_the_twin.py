@@ -149,6 +149,8 @@ class Measured(NamedTuple):
     judged: bool
     """Whether the station would judge it: sure enough, and decided."""
     undecided: bool
+    lower_bound: bool
+    """Whether the area is only what is in contact at least."""
 
 
 def measured_presses(seeds: Sequence[int], kinds: Sequence[str] = FRUITS, *, bruised: bool = False) -> list[Measured]:
@@ -181,6 +183,7 @@ def measured_presses(seeds: Sequence[int], kinds: Sequence[str] = FRUITS, *, bru
                             peer_px,
                             judged,
                             undecided,
+                            Flag.LOWER_BOUND in contact.flags,
                         )
                     )
     return found
@@ -202,6 +205,7 @@ def twin_table() -> list[str]:
         "",
         f"Median and p95 up to {FIRM_MM2} mm²: {median_and_p95(light, ' and ')};",
         f"over it: {median_and_p95(firm, ' and ')}.",
+        lower_bounds(large),
         f"With one frame a step instead of {FRAMES_PER_STEP}: {median_and_p95(single, ' and ')}.",
         f"Of the {len(wrong)} areas that are wrong by more than {LARGE_ERROR:.0%}, {flagged[0]:.0%} are flagged;",
         f"of the {len(right)} others, {flagged[1]:.0%}.",
@@ -223,8 +227,15 @@ def bruised_table() -> list[str]:
         "",
         f"Median and p95 up to {FIRM_MM2} mm²: {median_and_p95(light, ' and ')};",
         f"over it: {median_and_p95(firm, ' and ')}.",
+        lower_bounds(large),
         f"Of the {len(wrong)} areas that are wrong by more than {LARGE_ERROR:.0%}, {flagged:.0%} are flagged.",
     ]
+
+
+def lower_bounds(rows: Sequence[Measured]) -> str:
+    """The errors without areas that say no more than at least so much."""
+    others = [one.error for one in rows if not one.lower_bound]
+    return f"Without the {len(rows) - len(others)} flagged as a lower bound: {median_and_p95(others, ' and ')}."
 
 
 def errors_table(found: Sequence[Measured], keys: Sequence[str]) -> list[str]:
