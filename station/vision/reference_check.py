@@ -49,7 +49,7 @@ wide."""
 _LEAST_LIKENESS = -4.9
 """In the middle of the gap between 523 frames of units against themselves (at most -5.34: real presses perturbed, the
 twin's presses of the fit's both parts) and the two pairs of real units that the first way misses (-4.36). Fogged lenses
-are at -8.2 and below."""
+are at -8.2 and below. `./run bench fit --reference` shows what is nearest on either side."""
 _LEAST_LIGHT_CHANGE_LEVELS = 5.0
 """Standard deviation over the frame. Between real units it is 8 and more; without it, compression that wipes out a
 weak pattern would pass for another unit."""
