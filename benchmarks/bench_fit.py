@@ -127,9 +127,9 @@ def reference(runner: Runner, images: Path) -> None:
     """Write how far the reference check tells a unit from another."""
     lines = [
         "The statistic of `station/vision/reference_check.py` over its threshold; above 1 a frame is flagged as of",
-        "another unit. The thresholds were chosen on these images, and on them with noise, drift and compression. The twin's",
-        "units share a few modes of light, so that some cannot be told apart; a lens that has fogged over takes away the",
-        "pattern by which a unit is known.",
+        "another unit. The thresholds were chosen on these images, and on them with noise, drift and compression. The",
+        "twin's units share a few modes of light, so that some cannot be told apart; a lens that has fogged over takes",
+        "away the pattern by which a unit is known.",
         "",
         *reference_table(runner.parts, images),
     ]
