@@ -15,19 +15,20 @@ import numpy.typing as npt
 
 from station.vision.constants import Constants
 from station.vision.contact import FloatImage, Image
-from station.vision.working import clipped, length_squared, resized
+from station.vision.working import NEXT_TO_NOTHING, clipped, length_squared, resized
 
 _GRID_LONG_SIDE = 32
 _HIGHEST_COSINE = 4
 _ITERATIONS = 3
 _LEAST_KNOWN = 0.05
+LEAST_BACKGROUND = 0.02
+"""Share of the frame below which nothing is counted in the background, since there is hardly any."""
 _TUKEY_WIDTH = 3.0
 _LEAST_SPREAD_LEVELS = 0.5
 """What the rounding of pixels to whole levels can hide; real sensors' noise is more."""
 _STRIP_PX = 5
 """At half the working size."""
 _MEDIAN_SIDE = 20
-_NO_PRIOR = 1e-3
 _FREE = 10.0
 """So wide a prior only keeps the equations solvable, where a reference has no light."""
 
@@ -205,7 +206,7 @@ def _offsets(strips: FloatImage, background: FloatImage, axis: int, constants: C
     # Twice as many strips as the known share have to be background before a line's own mean is believed.
     known = min(max(float(background.mean()) / constants.known_share, _LEAST_KNOWN), 1)
     prior = strips.shape[axis] * min(constants.stripe_prior / known**2, 0.1)
-    away = length_squared(strips - _line_means(strips, background, axis, _NO_PRIOR))
+    away = length_squared(strips - _line_means(strips, background, axis, NEXT_TO_NOTHING))
     limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), _LEAST_SPREAD_LEVELS**2)
     weight = np.square(np.maximum(0, 1 - away / np.float32(limit))) * background
     return _line_means(strips, weight, axis, prior)

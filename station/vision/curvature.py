@@ -9,17 +9,15 @@ two eigenvalues of the local structure tensor, summed over the channels, whose r
 import cv2
 import numpy as np
 
-from station.vision.background import Background, quantile, weighted_median
+from station.vision.background import LEAST_BACKGROUND, Background, quantile, weighted_median
 from station.vision.constants import Constants
 from station.vision.contact import FloatImage
-from station.vision.working import resized
+from station.vision.working import product, resized
 
-_ONES = np.ones((1, 3), np.float32)
 _CALMEST = 0.05
 """The share of the frame that is background for certain, before anything is known."""
 _LIMIT_FLOOR = 0.15
 """Of `least_curvature`: added to the limit, so that an image without noise has a background too."""
-_LEAST_BACKGROUND = 0.02
 _HALF_FROM_PX = 3.0
 
 
@@ -35,11 +33,13 @@ def curvature(change: FloatImage, step: int, constants: Constants) -> FloatImage
         Shape (height, width), grey levels per pixel of the working image.
     """
     smooth = cv2.GaussianBlur(change, (0, 0), constants.curvature_blur / step)
-    slope_x = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=1 / (8 * step))
-    slope_y = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=1 / (8 * step))
+    slope_x, slope_y = (
+        np.asarray(cv2.Sobel(smooth, cv2.CV_32F, dx, dy, scale=1 / (8 * step)), np.float32)
+        for dx, dy in ((1, 0), (0, 1))
+    )
     # The three entries of the structure tensor, the colours added up before the window: it is linear.
     products = ((slope_x, slope_x), (slope_y, slope_y), (slope_x, slope_y))
-    tensor = cv2.merge([cv2.transform(cv2.multiply(a, b), _ONES) for a, b in products])
+    tensor = cv2.merge([product(a, b) for a, b in products])
     height, width = change.shape[:2]
     window = constants.curvature_window / step
     if window > _HALF_FROM_PX:  # a wide window loses nothing at half the size, and takes a quarter of the time
@@ -78,7 +78,7 @@ def curvature_noise(response: FloatImage, background: Background) -> float:
         response: of the change without its background, grey levels per pixel.
         background: of the same frame.
     """
-    if background.share < _LEAST_BACKGROUND:
+    if background.share < LEAST_BACKGROUND:
         return 0.0
     weight = resized(background.weight, (response.shape[1], response.shape[0]))
     return weighted_median(response, weight)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from station.vision.contact import FloatImage
-from station.vision.working import length_squared, resized
+from station.vision.working import NEXT_TO_NOTHING, length_squared, resized
 
 _FINE_PX, _LENGTH_PX = (1.0, 4.0), 1.5
 _LEAST_LEVELS = 10.0
@@ -20,7 +20,6 @@ _LONGEST_PX = 40
 """At half the working size, about 4 mm, two particles side by side: what is longer is the edge of a beam of light."""
 _INPAINT_PX, _INPAINTED_BLUR_PX = 3, 2.0
 _COMPARED_PX, _AROUND_PX = 1.0, 4.0
-_LEAST_SEEN = 1e-3
 _STEEPEST = 0.4
 """Gate over the root of the contact's area, px of half the working size. Judged contacts reach 0.38, raspberries;
 judged specks that had moved begin at 0.42: measured on 100 gels of the twin with debris, and on 220 contacts."""
@@ -78,7 +77,7 @@ class Debris:
         is_hidden = hidden < shown
         valid = np.maximum(self.clean, is_hidden)
         known = np.where(is_hidden[..., None], given_back, change) * valid[..., None]
-        weight = np.maximum(cv2.GaussianBlur(valid, (0, 0), _AROUND_PX), _LEAST_SEEN)
+        weight = np.maximum(cv2.GaussianBlur(valid, (0, 0), _AROUND_PX), NEXT_TO_NOTHING)
         around = np.asarray(cv2.GaussianBlur(known, (0, 0), _AROUND_PX) / weight[..., None], np.float32)
         filled = np.where(is_hidden[..., None], given_back, around)
         change[self._places] = filled[self._places]

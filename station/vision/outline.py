@@ -13,8 +13,8 @@ from station.vision.constants import Constants
 from station.vision.contact import FloatImage, Mask
 from station.vision.contour import Edge, find_edge, inside_image
 from station.vision.region import Region
+from station.vision.working import SUBPIXEL_BITS
 
-_SUBPIXEL_BITS = 4
 _MARGIN_PX = 6
 """At half the working size, around a textured body: as far as its segmentation's windows reach, and a pixel more."""
 _WITHIN, _BEYOND = 0.8, 1.2
@@ -93,8 +93,8 @@ def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0
     """
     points = (edge.points + 0.5) * scale - 0.5
     mask = np.zeros(shape, np.uint8)
-    fixed = np.rint(points * (1 << _SUBPIXEL_BITS)).astype(np.int32)
-    cv2.fillPoly(mask, [fixed], 255, cv2.LINE_8, _SUBPIXEL_BITS)
+    fixed = np.rint(points * (1 << SUBPIXEL_BITS)).astype(np.int32)
+    cv2.fillPoly(mask, [fixed], 255, cv2.LINE_8, SUBPIXEL_BITS)
     return mask
 
 

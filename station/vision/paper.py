@@ -11,9 +11,7 @@ import numpy.typing as npt
 
 from station.settings.segmentation import PaperParameters
 from station.vision.contact import Contact, Image, Mask, StageSink, contact_from_mask
-
-PRINTED_IMAGE_PX = 640 * 480
-"""The image area for which the paper prints its smallest component."""
+from station.vision.working import PRINTED_IMAGE_PX
 
 _KMEANS_ITERATIONS = 10
 _KMEANS_EPSILON = 1.0

@@ -6,11 +6,11 @@ import numpy as np
 from station.vision.candidates import Candidates
 from station.vision.contact import FloatImage, Image, Mask, StageSink
 from station.vision.contour import Edge
+from station.vision.working import SUBPIXEL_BITS
 
 _GREY = 128.0
 _AMPLIFICATION = 4.0
 _BLUR_PX = 1.0
-_SUBPIXEL_BITS = 4
 _LEVEL_SHOWN = 8.0
 """Grey levels: twice as much is brightest where nothing has moved more."""
 
@@ -49,9 +49,9 @@ def emit(
     outlined = cv2.resize(_signed(denoised, _AMPLIFICATION), size, interpolation=cv2.INTER_NEAREST)
     scale = np.divide(size, (change.shape[1], change.shape[0]))
     for edge in edges:
-        points = np.rint(((edge.points + 0.5) * scale - 0.5) * (1 << _SUBPIXEL_BITS)).astype(np.int32)
+        points = np.rint(((edge.points + 0.5) * scale - 0.5) * (1 << SUBPIXEL_BITS)).astype(np.int32)
         cv2.polylines(
-            outlined, [points], isClosed=True, color=(255, 255, 255), lineType=cv2.LINE_AA, shift=_SUBPIXEL_BITS
+            outlined, [points], isClosed=True, color=(255, 255, 255), lineType=cv2.LINE_AA, shift=SUBPIXEL_BITS
         )
     pictures = (
         _signed(difference, 1),

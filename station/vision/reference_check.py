@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from station.vision.contact import FloatImage
-from station.vision.working import length_squared, resized
+from station.vision.working import length_squared, product, resized
 
 _CELLS = 80
 """Cells along the long side, 4 px of a 320 px image: finer pattern is lost in noise, compression and shifts."""
@@ -98,7 +98,7 @@ class ReferenceCheck:
         Args:
             pattern: the frame's, shape (rows, columns, 3), grey levels.
         """
-        common = _product(pattern, self._pattern)
+        common = product(pattern, self._pattern)
         weight = 1.0 / (length_squared(pattern) + self._energy + _KNOWN_LEVELS_SQUARED)
         found = float(np.vdot(common + _KNOWN_LEVELS_SQUARED, weight))
         expected = float(np.vdot(self._energy + _KNOWN_LEVELS_SQUARED, weight))
@@ -117,7 +117,7 @@ class ReferenceCheck:
             known = own * gain
             energy = length_squared(known)
             weight = 1.0 / (length_squared(seen) + energy + floor)
-            slope = float(np.vdot(_product(known, seen), weight)) / float(np.vdot(energy, weight) + _LEAST_RATIO)
+            slope = float(np.vdot(product(known, seen), weight)) / float(np.vdot(energy, weight) + _LEAST_RATIO)
             unexplained = seen - known * min(max(slope, 0.0), 1.0)
             power, pattern = (resized(one, self._tiles) for one in (length_squared(unexplained), energy))
             ratio = np.log(power / (pattern + floor) + _LEAST_RATIO)
@@ -125,11 +125,6 @@ class ReferenceCheck:
             unevenness += float(ratio.std()) / 2
         fine, coarse = strengths
         return (fine + coarse) / 2 - abs(fine - coarse) - _UNEVEN * unevenness
-
-
-def _product(one: FloatImage, other: FloatImage) -> FloatImage:
-    """The product summed over the colours, shape (rows, columns)."""
-    return np.asarray(cv2.transform(cv2.multiply(one, other), np.ones((1, 3), np.float32)), np.float32)
 
 
 def _cells(image: FloatImage) -> FloatImage:

@@ -14,24 +14,20 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from station.vision.background import Background, quantile, quantiles, thinned, weighted_median
+from station.vision.background import LEAST_BACKGROUND, Background, quantile, quantiles, thinned, weighted_median
 from station.vision.constants import NORMAL_OF_MEDIAN, Constants
 from station.vision.contact import FloatImage, Mask
 from station.vision.contour import Rays, closed_path
-from station.vision.working import blurred, length_squared, resized
+from station.vision.working import HALF_FROM_PX, NEXT_TO_NOTHING, SUBPIXEL_BITS, blurred, length_squared, resized
 
 _CHANGE_BLUR_PX = 1.0
 _STEPS = 80
 _FIRST_EVERY = 2
-_HALF_FROM_PX = 2.5
-_LEAST_LEVEL = 1e-3
 _FLOOR_QUANTILE = 0.03
 """Of a field without background: nearly its least."""
-_LEAST_BACKGROUND = 0.02
 _LEAST_WINDOW_PX = 1.5
 _LEAST_RADIUS_PX = 3.0
 _STRONG_QUANTILE, _STRONGEST_QUANTILE = 0.9, 0.97
-_SUBPIXEL_BITS = 4
 
 _Floats = npt.NDArray[np.float64]
 
@@ -149,7 +145,7 @@ def find_region(
         level = seen.levels * moved.flat_field
         # Clipped, so that the rim of a ball or an achene weighs no more than the rest of the contact.
         inside = mask > 0
-        cap, middle = (max(one, _LEAST_LEVEL) for one in quantiles(level[inside], p.cap_quantile, 0.5))
+        cap, middle = (max(one, NEXT_TO_NOTHING) for one in quantiles(level[inside], p.cap_quantile, 0.5))
         if last:
             agreed = _coherence(moved, halved, mask, p.coherence_window * radius)
             # With hardly any background the model has bent the body's own slopes, and directions say little.
@@ -158,7 +154,7 @@ def find_region(
             # achenes or drupelets outshine the body, the further their part of the windowed level reaches beyond it.
             share = p.share_even + p.share_coherent * coherence + p.share_field * (cv2.countNonZero(mask) / mask.size)
             # How far elements outshine the body, 1/px.
-            strongest = max(quantile(moved.curvature[inside], _STRONGEST_QUANTILE), _LEAST_LEVEL)
+            strongest = max(quantile(moved.curvature[inside], _STRONGEST_QUANTILE), NEXT_TO_NOTHING)
             prominence = max(math.log(strongest / middle), p.least_prominence)
             share = min(max(share + p.share_prominent * prominence, p.share_least), p.share_most)
         gain = _clipped(level, cap) - np.float32(share)
@@ -200,7 +196,7 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
     p = constants
     halo = min(p.halo_over_least * quantile(thinned(moved.curvature), _FLOOR_QUANTILE), p.halo_curvature)
     curvature = np.sqrt(np.maximum(np.square(moved.curvature) - np.float32(halo**2), 0), dtype=np.float32)
-    cap = max(quantile(curvature[region > 0], p.curved_quantile), _LEAST_LEVEL)
+    cap = max(quantile(curvature[region > 0], p.curved_quantile), NEXT_TO_NOTHING)
     gain = _clipped(curvature, cap) - np.float32(p.curved_share)
     curved_radii = _most_gained(gain, rays, p.region_span * rays.reach(region), 1, p.path_stiffness)
     curved = _drawn(rays, curved_radii, 1, (region.shape[0], region.shape[1]))
@@ -234,7 +230,7 @@ def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float
     if not inside.any():
         return 0.0
     fine, whole = (quantile(length_squared(one)[inside], 0.5) for one in (elements - slopes, elements))
-    return fine / max(whole, _LEAST_LEVEL)
+    return fine / max(whole, NEXT_TO_NOTHING)
 
 
 def has_moved_widely(moved: Movement, constants: Constants) -> bool:
@@ -285,7 +281,7 @@ def level_of(moved: Movement, window_px: float) -> Level:
 
 def _in_background(few: FloatImage, moved: Movement) -> float:
     """The median of a thinned field in the background, or nearly its least where there is hardly any."""
-    if moved.share < _LEAST_BACKGROUND:
+    if moved.share < LEAST_BACKGROUND:
         return quantile(few, _FLOOR_QUANTILE)
     return weighted_median(few, thinned(moved.weight))
 
@@ -303,13 +299,13 @@ def _coherence(moved: Movement, halved: Movement, region: Mask, window_px: float
     share of the region that has moved least is left out: noise has no direction.
     """
     window_px = max(_CHANGE_BLUR_PX, window_px)
-    if window_px > _HALF_FROM_PX:  # a wide window loses nothing at half the size, and takes a quarter of the time
+    if window_px > HALF_FROM_PX:
         moved, window_px = halved, window_px / 2
         size = (moved.change.shape[1], moved.change.shape[0])
         region = np.asarray(cv2.resize(region, size, interpolation=cv2.INTER_NEAREST), np.uint8)
     smooth = np.asarray(cv2.GaussianBlur(moved.change, (0, 0), window_px), np.float32)
     mean_square = np.asarray(cv2.GaussianBlur(moved.squared, (0, 0), window_px), np.float32)
-    seen = moved.share >= _LEAST_BACKGROUND
+    seen = moved.share >= LEAST_BACKGROUND
     floors = [
         weighted_median(one, moved.weight) if seen else quantile(thinned(one), _FLOOR_QUANTILE)
         for one in (length_squared(smooth), mean_square)
@@ -320,7 +316,7 @@ def _coherence(moved: Movement, halved: Movement, region: Mask, window_px: float
     mean_square -= 2 * (smooth.reshape(-1, 3) @ cast).reshape(square.shape)
     inside = region > 0
     agreed = np.maximum(square[inside] - floors[0], 0)
-    whole = np.maximum(mean_square[inside] + cast @ cast - floors[1], _LEAST_LEVEL)
+    whole = np.maximum(mean_square[inside] + cast @ cast - floors[1], NEXT_TO_NOTHING)
     if left_out:
         kept = whole >= quantile(whole, left_out)
         agreed, whole = agreed[kept], whole[kept]
@@ -343,8 +339,8 @@ def _most_gained(gain: FloatImage, rays: Rays, reach: float, every: int, stiffne
 def _drawn(rays: Rays, radii: _Floats, every: int, shape: tuple[int, int]) -> Mask:
     x, y = rays.places(radii[:, None], every)
     mask = np.zeros(shape, np.uint8)
-    points = np.rint(np.concatenate([x, y], axis=1) * (1 << _SUBPIXEL_BITS)).astype(np.int32)
-    return np.asarray(cv2.fillPoly(mask, [points], 1, cv2.LINE_8, _SUBPIXEL_BITS), np.uint8)
+    points = np.rint(np.concatenate([x, y], axis=1) * (1 << SUBPIXEL_BITS)).astype(np.int32)
+    return np.asarray(cv2.fillPoly(mask, [points], 1, cv2.LINE_8, SUBPIXEL_BITS), np.uint8)
 
 
 def _inner_hull(region: Mask, share: float) -> Mask:
@@ -356,7 +352,7 @@ def _inner_hull(region: Mask, share: float) -> Mask:
     if moments["m00"] > 0:
         middle = np.array([moments["m10"], moments["m01"]]) / moments["m00"]
         points = middle + (hull - middle) * share
-        cv2.fillPoly(inner, [np.rint(points * 16).astype(np.int32)], 1, cv2.LINE_8, _SUBPIXEL_BITS)
+        cv2.fillPoly(inner, [np.rint(points * (1 << SUBPIXEL_BITS)).astype(np.int32)], 1, cv2.LINE_8, SUBPIXEL_BITS)
     return inner
 
 

@@ -31,12 +31,15 @@ from station.vision.region import (
     movement,
 )
 from station.vision.weak_contact import WeakContactDetector, WeakResponse
-from station.vision.working import SATURATED_LEVEL, clipped, resized, working_image
+from station.vision.working import (
+    PRINTED_IMAGE_PX,
+    PRINTED_LONG_SIDE_PX,
+    SATURATED_LEVEL,
+    clipped,
+    resized,
+    working_image,
+)
 from station.vocabulary import Flag
-
-PRINTED_LONG_SIDE_PX = 640
-PRINTED_IMAGE_PX = 640 * 480
-"""The image for which the recipe's parameters in pixels are given; they scale with the image."""
 
 _COARSE_STEP, _FINE_STEP = 4, 2
 """By how much the fields of the first guess and of all else are smaller than the working image."""

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from math import sqrt
 
+from station.vision.working import PRINTED_LONG_SIDE_PX
+
 TYPICAL_MM_PER_PX = 0.0266
 """At 640 pixels along the longer side: the middle of what is published for single DIGIT units, 0.0255 to 0.0291."""
 
@@ -11,8 +13,6 @@ TYPICAL_UNCERTAINTY = 0.15
 
 TYPICAL_STANDARD_UNCERTAINTY = TYPICAL_UNCERTAINTY / sqrt(3)
 """Its standard uncertainty: a unit's own lies anywhere in the published range alike (GUM 4.3.7)."""
-
-_LONG_SIDE_PX = 640
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Scale:
         """
         if height_px <= 0 or width_px <= 0:
             raise ValueError(f"an image of {width_px} x {height_px} px has no scale: both sides must be positive")
-        return cls(TYPICAL_MM_PER_PX * _LONG_SIDE_PX / max(height_px, width_px), TYPICAL_UNCERTAINTY)
+        return cls(TYPICAL_MM_PER_PX * PRINTED_LONG_SIDE_PX / max(height_px, width_px), TYPICAL_UNCERTAINTY)
 
     def area_mm2(self, area_px: float) -> tuple[float, float]:
         """An area and its uncertainty, both in mm².

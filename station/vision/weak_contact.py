@@ -15,8 +15,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from station.settings.segmentation import RobustParameters
 from station.vision.constants import NORMAL_OF_MEDIAN, Constants
 from station.vision.contact import FloatImage, Mask
+from station.vision.working import LONG_SIDE_PX, NEXT_TO_NOTHING, length_squared
 
 _REACH = 3.5
 _COSINES_DOWN = 7
@@ -25,13 +27,9 @@ _LEVELS, _MOST_CUT_OFF = (12.0, 224.0), 0.05
 """Beyond these noise and drift reach the ends of the scale, where drift has edges; and how much of a column may be."""
 _PATTERN_SIGMA_PX = 2.0
 """The reference's own noise must not pass for its pattern: the change has the same noise."""
-_LEAST_NOISE_LEVELS = 1e-3
 _WINSORISED, _RIDGE = 2.0, 0.05
 _EVERY, _BORDER_PX = 2, 8
 """Noise is counted at every second place, away from the border, where there is less of it."""
-_LONG_SIDE_PX = 160
-_GATE_RATIO = 3.0
-"""The recipe's default `gate_ratio`; a higher one raises the detector's thresholds too."""
 _LEAST_VALID, _RIM_PX = 0.5, 9
 _LARGE_SHARE = 0.1
 """Of the frame."""
@@ -68,12 +66,12 @@ class WeakContactDetector:
         gate_ratio: float,
     ) -> None:
         height, width = clean.shape
-        # A lower ratio than the default does not lower the thresholds: noise would reach them.
-        self.threshold = constants.weak_threshold * max(1.0, gate_ratio / _GATE_RATIO)
+        # A higher ratio than the default raises them; a lower one does not lower them: noise would reach them.
+        self.threshold = constants.weak_threshold * max(1.0, gate_ratio / RobustParameters().gate_ratio)
         """What the response has to reach."""
         self._most_of_fine = constants.weak_most_of_fine
         self._reference, self._lit = reference, lit.astype(np.float32)
-        sigma_px = constants.dent_sigma * min(1.0, max(height, width) / _LONG_SIDE_PX)
+        sigma_px = constants.dent_sigma * min(1.0, max(height, width) / (LONG_SIDE_PX / 2))
         self._reach_px = int(np.ceil(_REACH * sigma_px))
         x = np.arange(-self._reach_px, self._reach_px + 1, dtype=np.float32)
         dent = np.exp(-np.square(x / sigma_px) / 2)
@@ -177,7 +175,7 @@ def _inner(field: FloatImage) -> FloatImage:
 def _spread(values: FloatImage) -> FloatImage:
     """Each colour's standard deviation by its median size, shape (3,): a contact takes little of the frame."""
     spread = NORMAL_OF_MEDIAN * np.median(np.abs(values), axis=0)
-    return np.maximum(spread, _LEAST_NOISE_LEVELS).astype(np.float32)
+    return np.maximum(spread, NEXT_TO_NOTHING).astype(np.float32)
 
 
 def _fine_noise(left: FloatImage) -> FloatImage:
@@ -196,8 +194,8 @@ def _in_units_of_noise(slopes: FloatImage, spread: FloatImage) -> FloatImage:
     """
     noise = np.clip(_inner(slopes) / spread, -_WINSORISED, _WINSORISED)
     common = noise.T @ noise
-    size = np.sqrt(np.maximum(common.diagonal(), _LEAST_NOISE_LEVELS))
+    size = np.sqrt(np.maximum(common.diagonal(), NEXT_TO_NOTHING))
     common = (1 - _RIDGE) * common / np.outer(size, size) + _RIDGE * np.eye(3)
     apart = np.linalg.inv(np.linalg.cholesky(common)) / spread
     alone = cv2.transform(slopes, apart.astype(np.float32))
-    return np.asarray(cv2.transform(cv2.multiply(alone, alone), np.ones((1, 3), np.float32)), np.float32)
+    return length_squared(np.asarray(alone, np.float32))

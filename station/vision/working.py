@@ -11,7 +11,20 @@ LONG_SIDE_PX = 320
 SATURATED_LEVEL = 248
 """Grey level from which a channel is taken as saturated: the sensor's own processing stops short of 255."""
 
-_HALF_FROM_PX = 2.5
+HALF_FROM_PX = 2.5
+"""Standard deviation beyond which a Gaussian window is applied at half the size: it loses nothing, in a quarter of the
+time."""
+
+PRINTED_LONG_SIDE_PX, PRINTED_IMAGE_PX = 640, 640 * 480
+"""Long side and area of the image for which parameters in pixels are given: they scale with the image."""
+
+SUBPIXEL_BITS = 4
+"""Of a fixed-point coordinate that is drawn: a sixteenth of a pixel."""
+
+NEXT_TO_NOTHING = 1e-3
+"""Added, or least, where a division needs more than 0: of grey levels, their squares and weights alike far below what
+a sensor shows."""
+
 _SUM = np.ones((1, 3), np.float32)
 
 
@@ -61,7 +74,7 @@ def blurred(field: FloatImage, sigma_px: float) -> FloatImage:
         field: shape (height, width) or (height, width, channels), float32.
         sigma_px: the window's standard deviation.
     """
-    if sigma_px <= _HALF_FROM_PX:
+    if sigma_px <= HALF_FROM_PX:
         return np.asarray(cv2.GaussianBlur(field, (0, 0), sigma_px), np.float32)
     size = (field.shape[1], field.shape[0])
     half = resized(field, (-(-size[0] // 2), -(-size[1] // 2)))
@@ -77,4 +90,17 @@ def length_squared(change: FloatImage) -> FloatImage:
     Returns:
         Shape (height, width).
     """
-    return np.asarray(cv2.transform(cv2.multiply(change, change), _SUM), np.float32)
+    return product(change, change)
+
+
+def product(one: FloatImage, other: FloatImage) -> FloatImage:
+    """The product summed over the channels.
+
+    Args:
+        one: shape (height, width, 3).
+        other: likewise.
+
+    Returns:
+        Shape (height, width).
+    """
+    return np.asarray(cv2.transform(cv2.multiply(one, other), _SUM), np.float32)
