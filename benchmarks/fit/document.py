@@ -32,7 +32,7 @@ COLUMNS = (
     "Spearman >= 0.99",
     "cost",
 )
-SECTIONS = ("Data sets and cost", "Constants", "Stages", "Fit", "Reliability", "Reference check")
+SECTIONS = ("Data sets and cost", "Constants", "Stages", "Fit", "Reliability", "Reference check", "Fixed numbers")
 
 
 def write_section(name: str, lines: Sequence[str]) -> None:

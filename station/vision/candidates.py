@@ -15,11 +15,10 @@ _FOOT_SHARE = 0.5
 """Of the detection threshold: a candidate's foot is never lower."""
 _STRONG_SHARE, _LOW_QUANTILE = 0.6, 0.3
 """Of the strongest curvature, what counts as curved; and the quantile of the level there that a body mostly reaches."""
-_OVER_SPREAD = 3.0
-"""In standard deviations of the background's level: a candidate stands out by as much."""
 _OWN_SHARE = 0.35
 """Of its own strongest place: what belongs to one of several contacts, so that a strong neighbour hides none."""
 _WEAK_RADIUS_PX = 7
+"""At half the working size: a contact of 2 mm², where a weak one is looked for."""
 _NECKS, _NECK_DEPTH = (0.4, 0.55, 0.7, 0.8), 0.12
 """Of the greatest depth: where several contacts are parted, and by how much both sides have to be deeper."""
 
@@ -44,13 +43,12 @@ def body_candidates(moved: Movement, threshold: float, constants: Constants) -> 
         constants: window and share.
     """
     curvature = moved.curvature
-    seen = level_of(moved, constants.level_window)
-    level = seen.levels
+    level = level_of(moved, constants.level_window).levels
     strongest = float(curvature.max())
     if strongest <= threshold:
         return Candidates([], level)
     strong = level[curvature > min(threshold, _STRONG_SHARE * strongest)]
-    lowest = max(_OVER_SPREAD * seen.spread(moved), constants.candidate_share * quantile(strong, _LOW_QUANTILE))
+    lowest = constants.candidate_share * quantile(strong, _LOW_QUANTILE)
     standing_out = ((level > lowest) | (curvature > threshold)).astype(np.uint8)
     found = [part for part in _parts(standing_out) if cv2.minMaxLoc(curvature, part)[1] > threshold]
     return Candidates(_heaviest_first(level, found), level)

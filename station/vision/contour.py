@@ -18,17 +18,19 @@ from station.vision.constants import Constants
 from station.vision.contact import FloatImage, Mask
 
 RAYS = 64
+"""Around a contact. Resolution: 5.6° apart."""
 _FIRST_SHARES, _SECOND_SHARES = np.linspace(0.3, 1.2, 32), np.linspace(0.6, 1.4, 64)
 """In radii, where the edge is looked for about the region's middle and about the first path's."""
 _LONGEST_JUMP = 2
+"""Steps from ray to ray, at a price that rises with their square. Resolution of the path."""
 _SIDE_SHARE = 0.15
 """Of the radius: on either side of the edge, where the drop across it is read."""
 _ASPECTS, _STRETCHES = (2.0, 3.0, 8.0), (1.0, 3.0, 8.0)
 """Length over width of a region, and how far its rays are stretched: fruit is drawn on equal rays, a stem is not."""
-_REACH_STEP_PX = 1.0
 
 _Floats = npt.NDArray[np.float64]
 _ANGLES = np.arange(RAYS) * (2 * np.pi / RAYS)
+"""Of the rays, rad: a whole turn."""
 _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)])
 
 
@@ -206,7 +208,7 @@ def _mirrored(region: Mask, constants: Constants) -> tuple[int, int, int, int]:
 
 def _reach(region: Mask, rays: Rays) -> _Floats:
     """How far a region reaches on each ray."""
-    steps = np.arange(1.0, np.hypot(*region.shape), _REACH_STEP_PX)
+    steps = np.arange(1.0, np.hypot(*region.shape))
     x, y = rays.places(steps)
     values = cv2.remap(region, x, y, cv2.INTER_NEAREST, None, cv2.BORDER_CONSTANT)
     return np.asarray(np.where(values > 0, steps, 2.0).max(axis=1), np.float64)

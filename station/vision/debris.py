@@ -13,13 +13,15 @@ from station.vision.contact import FloatImage
 from station.vision.working import NEXT_TO_NOTHING, length_squared, resized
 
 _FINE_PX, _LENGTH_PX = (1.0, 4.0), 1.5
+"""At half the working size, of the Gaussians between which a particle is, about 0.2 to 0.9 mm, and of its strength."""
 _LEAST_LEVELS = 10.0
 """Of what is fine in the reference: without debris it reaches 6 on the twin and 8 on the real presses' reference."""
 _RING_PX, _HALO_PX = 9, 5
+"""At half the working size: over a particle's dark middle, and what it changes around it; 0.5 and 0.3 mm."""
 _LONGEST_PX = 40
 """At half the working size, about 4 mm, two particles side by side: what is longer is the edge of a beam of light."""
-_INPAINT_PX, _INPAINTED_BLUR_PX = 3, 2.0
 _COMPARED_PX, _AROUND_PX = 1.0, 4.0
+"""Windows at half the working size, as fine and as coarse as above: of what is compared, and of the filling."""
 _STEEPEST = 0.4
 """Gate over the root of the contact's area, px of half the working size. Judged contacts reach 0.38, raspberries;
 judged specks that had moved begin at 0.42: measured on 100 gels of the twin with debris, and on 220 contacts."""
@@ -87,6 +89,6 @@ class Debris:
 def _pattern(light: FloatImage, places: npt.NDArray[np.bool_]) -> FloatImage:
     """What the debris adds to the reference: it less what its surroundings go on as."""
     wide = cv2.dilate(places.astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_HALO_PX, _HALO_PX)))
-    without = cv2.inpaint(light.astype(np.uint8), wide, _INPAINT_PX, cv2.INPAINT_NS).astype(np.float32)
-    smooth = cv2.GaussianBlur(without, (0, 0), _INPAINTED_BLUR_PX)
+    without = cv2.inpaint(light.astype(np.uint8), wide, _HALO_PX, cv2.INPAINT_NS).astype(np.float32)
+    smooth = cv2.GaussianBlur(without, (0, 0), _COMPARED_PX)
     return np.where(places[..., None], light - smooth, np.float32(0))

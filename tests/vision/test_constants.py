@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import station.vision
+from benchmarks.fit.fixed import fixed_numbers, table
 from station.vision.constants import CONSTANTS, Constants
 
 SOURCES = {
@@ -36,3 +37,14 @@ def test_constants_are_changed_by_making_others():
     changed = replace(CONSTANTS, known_share=0.3)
     assert changed.known_share == 0.3
     assert CONSTANTS.known_share != 0.3
+
+
+def test_every_other_number_says_what_it_is():
+    numbers = list(fixed_numbers())
+    assert [f"{one.file}: {', '.join(one.names)}" for one in numbers if not one.meaning] == []
+    assert len(numbers) > 50
+
+
+def test_the_document_has_every_other_number():
+    page = (Path(__file__).resolve().parents[2] / "docs" / "robust-constants.md").read_text(encoding="utf-8")
+    assert [line for line in table() if line not in page] == []
