@@ -105,9 +105,8 @@ def fixed() -> None:
         f"The method has {fitted} constants, each with its unit, meaning and origin in `station/vision/constants.py`,",
         f"and {count} numbers that its modules declare: how finely something is computed, what a sensor cannot show,",
         f"and sizes of places. That makes {fitted + count}. Counted alike there were {BEFORE} on {BEFORE_DATE}, before",
-        "the pipeline was rebuilt and the fit written. The candidates for removal above were tried without. Those that",
-        "stay set a flag's limit or a scale, are what their stage is made of, or serve a case that a test has and the",
-        "data sets lack: large balls in single images, shadows of one colour, skin over the whole field.",
+        "the pipeline was rebuilt and the fit written. The candidates for removal above were tried without, one by one",
+        "and ten together: [what that cost](decisions/robust-method-history.md).",
         "",
         *fixed_table(),
     ]

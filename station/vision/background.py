@@ -23,8 +23,8 @@ _HIGHEST_COSINE = 4
 """Half periods over the frame. At 3 the fit's cost is 0.01 higher; higher ones follow a contact."""
 _ITERATIONS = 3
 """Of the re-weighting. Resolution: with 2 the fit's cost is 0.01 higher."""
-CALMEST = 0.05
-"""Quantile of a field that is background for certain, where nothing is known of it."""
+_LEAST_KNOWN = 0.05
+"""Share of the known background below which the priors are drawn in no further, and the spread is not measured."""
 LEAST_BACKGROUND = 0.02
 """Share of the frame below which nothing is counted in the background, since there is hardly any."""
 _TUKEY_WIDTH = 3.0
@@ -133,7 +133,7 @@ class BackgroundModel:
         samples -= expected_levels
         trust = weight = resized(first_guess, self._grid).ravel()
         # The less background there is, the more of a contact's own slopes the shapes could explain.
-        known = min(max(float(weight.mean()) / p.known_share, LEAST_BACKGROUND), 1.0)
+        known = min(max(float(weight.mean()) / p.known_share, _LEAST_KNOWN), 1.0)
         ridge = self._ridge / known**3
         spread = p.most_spread / 2
         change = np.zeros_like(expected)
@@ -143,7 +143,7 @@ class BackgroundModel:
             change = np.linalg.solve(weighted @ self._coarse + ridge, weighted @ samples[..., None]).astype(np.float32)
             fitted = (self._coarse @ change)[..., 0]
             residual = np.sqrt(((samples - fitted) ** 2).sum(axis=0))
-            if weight.sum() >= LEAST_BACKGROUND * weight.size:
+            if weight.sum() >= _LEAST_KNOWN * weight.size:
                 spread = min(max(weighted_median(residual, weight), _LEAST_SPREAD_LEVELS), p.most_spread)
             weight = np.square(np.maximum(0, 1 - np.square(residual / np.float32(_TUKEY_WIDTH * spread)))) * trust
         coefficients = expected + change
@@ -210,7 +210,7 @@ def destriped(change: FloatImage, background: FloatImage, constants: Constants) 
 def _offsets(strips: FloatImage, background: FloatImage, axis: int, constants: Constants) -> FloatImage:
     """The lines' offsets along an axis, of length 1 along it."""
     # Twice as many strips as the known share have to be background before a line's own mean is believed.
-    known = min(max(float(background.mean()) / constants.known_share, LEAST_BACKGROUND), 1)
+    known = min(max(float(background.mean()) / constants.known_share, _LEAST_KNOWN), 1)
     prior = strips.shape[axis] * min(constants.stripe_prior / known**2, 0.1)
     away = length_squared(strips - _line_means(strips, background, axis, NEXT_TO_NOTHING))
     limit = _TUKEY_WIDTH**2 * max(weighted_median(away, background), _LEAST_SPREAD_LEVELS**2)

@@ -15,6 +15,8 @@ _FOOT_SHARE = 0.5
 """Of the detection threshold: a candidate's foot is never lower."""
 _STRONG_SHARE, _LOW_QUANTILE = 0.6, 0.3
 """Of the strongest curvature, what counts as curved; and the quantile of the level there that a body mostly reaches."""
+_OVER_SPREAD = 3.0
+"""In standard deviations of the background's level: a candidate stands out by as much."""
 _OWN_SHARE = 0.35
 """Of its own strongest place: what belongs to one of several contacts, so that a strong neighbour hides none."""
 _WEAK_RADIUS_PX = 7
@@ -43,12 +45,13 @@ def body_candidates(moved: Movement, threshold: float, constants: Constants) -> 
         constants: window and share.
     """
     curvature = moved.curvature
-    level = level_of(moved, constants.level_window).levels
+    seen = level_of(moved, constants.level_window)
+    level = seen.levels
     strongest = float(curvature.max())
     if strongest <= threshold:
         return Candidates([], level)
     strong = level[curvature > min(threshold, _STRONG_SHARE * strongest)]
-    lowest = constants.candidate_share * quantile(strong, _LOW_QUANTILE)
+    lowest = max(_OVER_SPREAD * seen.spread(moved), constants.candidate_share * quantile(strong, _LOW_QUANTILE))
     standing_out = ((level > lowest) | (curvature > threshold)).astype(np.uint8)
     found = [part for part in _parts(standing_out) if cv2.minMaxLoc(curvature, part)[1] > threshold]
     return Candidates(_heaviest_first(level, found), level)

@@ -9,8 +9,9 @@ from station.vision.background import thinned, weighted_median
 from station.vision.constants import NORMAL_OF_MEDIAN, Constants
 from station.vision.contact import FloatImage
 from station.vision.contour import Edge
-from station.vision.working import NEXT_TO_NOTHING
 
+_LEAST_NOISE_LEVELS = 0.1
+"""No sensor's noise is less; it only keeps an image without noise from dividing by 0."""
 _PER_SPREAD = 10.0
 """An agreement is one half where the frames' areas spread by a tenth."""
 
@@ -40,7 +41,7 @@ def edge_confidence(edge: Edge, noise_levels: float, constants: Constants) -> fl
     """
     if not edge.seen.any():
         return 0.0
-    ratios = (edge.drop_levels[edge.seen] / max(noise_levels, NEXT_TO_NOTHING)).tolist()
+    ratios = (edge.drop_levels[edge.seen] / max(noise_levels, _LEAST_NOISE_LEVELS)).tolist()
     signal = max(0.0, statistics.median(ratios))
     support = sum(ratio > 0 for ratio in ratios) / len(ratios)
     return support * signal**2 / (signal**2 + constants.reliable_ratio**2)

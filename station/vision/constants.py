@@ -35,6 +35,7 @@ class Constants:
     """Every number that decides how the robust method measures, beside the recipe's own parameters."""
 
     # Reference and input
+    lit_share: float = constant(0.25, "of the brightest colour's mean", "a colour below it has no light", "fit")
     most_drift_share: float = constant(
         0.35, "of the light", "more drift is another light: an LED is off, or the camera", "measured: drift 0.05"
     )
@@ -105,6 +106,8 @@ class Constants:
     smooth_small: float = constant(0.6, "", "coherence from which a small body is smooth", "fit")
     smooth_at_one: float = constant(1.36, "", "the same, extrapolated to a radius of one pixel", "fit")
     smooth_per_size: float = constant(0.222, "per e-fold of the radius", "how it falls with the radius", "fit")
+    halo_over_least: float = constant(1.5, "of the least curvature", "the halo curves no more", "fit")
+    halo_curvature: float = constant(0.5, "grey level/px", "nor more than this", "fit")
     curved_quantile: float = constant(0.6, "", "quantile of the region's curvature at which the gain is clipped", "fit")
     curved_share: float = constant(0.28, "of that", "where the curved region ends", "fit")
     fine_on_skin: float = constant(

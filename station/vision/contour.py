@@ -27,6 +27,8 @@ _SIDE_SHARE = 0.15
 """Of the radius: on either side of the edge, where the drop across it is read."""
 _ASPECTS, _STRETCHES = (2.0, 3.0, 8.0), (1.0, 3.0, 8.0)
 """Length over width of a region, and how far its rays are stretched: fruit is drawn on equal rays, a stem is not."""
+_REACH_STEP_PX = 1.0
+"""On a ray, in which a mask's reach is found. Resolution."""
 
 _Floats = npt.NDArray[np.float64]
 _ANGLES = np.arange(RAYS) * (2 * np.pi / RAYS)
@@ -208,7 +210,7 @@ def _mirrored(region: Mask, constants: Constants) -> tuple[int, int, int, int]:
 
 def _reach(region: Mask, rays: Rays) -> _Floats:
     """How far a region reaches on each ray."""
-    steps = np.arange(1.0, np.hypot(*region.shape))
+    steps = np.arange(1.0, np.hypot(*region.shape), _REACH_STEP_PX)
     x, y = rays.places(steps)
     values = cv2.remap(region, x, y, cv2.INTER_NEAREST, None, cv2.BORDER_CONSTANT)
     return np.asarray(np.where(values > 0, steps, 2.0).max(axis=1), np.float64)

@@ -9,13 +9,17 @@ two eigenvalues of the local structure tensor, summed over the channels, whose r
 import cv2
 import numpy as np
 
-from station.vision.background import CALMEST, LEAST_BACKGROUND, Background, quantile, weighted_median
+from station.vision.background import LEAST_BACKGROUND, Background, quantile, weighted_median
 from station.vision.constants import Constants
 from station.vision.contact import FloatImage
-from station.vision.working import HALF_FROM_PX, product, resized
+from station.vision.working import product, resized
 
+_CALMEST = 0.05
+"""The share of the frame that is background for certain, before anything is known."""
 _LIMIT_FLOOR = 0.15
 """Of `least_curvature`: added to the limit, so that an image without noise has a background too."""
+_HALF_FROM_PX = 3.0
+"""As `working.HALF_FROM_PX`, of the structure tensor's window."""
 
 
 def curvature(change: FloatImage, step: int, constants: Constants) -> FloatImage:
@@ -39,7 +43,7 @@ def curvature(change: FloatImage, step: int, constants: Constants) -> FloatImage
     tensor = cv2.merge([product(a, b) for a, b in products])
     height, width = change.shape[:2]
     window = constants.curvature_window / step
-    if window > HALF_FROM_PX:  # a wide window loses nothing at half the size, and takes a quarter of the time
+    if window > _HALF_FROM_PX:  # a wide window loses nothing at half the size, and takes a quarter of the time
         tensor, window = resized(np.asarray(tensor, np.float32), (-(-width // 2), -(-height // 2))), window / 2
     xx, yy, xy = cv2.split(cv2.GaussianBlur(tensor, (0, 0), window))
     determinant = np.maximum(xx * yy - xy * xy, 0)
@@ -59,7 +63,7 @@ def first_background(response: FloatImage, least_curvature: float, constants: Co
     Returns:
         Shape of `response`, 0 to 1.
     """
-    calmest = quantile(response, CALMEST)
+    calmest = quantile(response, _CALMEST)
     limit = min(constants.calm_ratio * calmest, (constants.calm_limit - _LIMIT_FLOOR) * least_curvature)
     limit += _LIMIT_FLOOR * least_curvature
     outlines, _ = cv2.findContours((response > limit).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)

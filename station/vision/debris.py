@@ -20,6 +20,8 @@ _RING_PX, _HALO_PX = 9, 5
 """At half the working size: over a particle's dark middle, and what it changes around it; 0.5 and 0.3 mm."""
 _LONGEST_PX = 40
 """At half the working size, about 4 mm, two particles side by side: what is longer is the edge of a beam of light."""
+_INPAINT_PX, _INPAINTED_BLUR_PX = 3, 2.0
+"""At the working size: how far around a particle its surroundings are continued from, and their smoothing."""
 _COMPARED_PX, _AROUND_PX = 1.0, 4.0
 """Windows at half the working size, as fine and as coarse as above: of what is compared, and of the filling."""
 _STEEPEST = 0.4
@@ -89,6 +91,6 @@ class Debris:
 def _pattern(light: FloatImage, places: npt.NDArray[np.bool_]) -> FloatImage:
     """What the debris adds to the reference: it less what its surroundings go on as."""
     wide = cv2.dilate(places.astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_HALO_PX, _HALO_PX)))
-    without = cv2.inpaint(light.astype(np.uint8), wide, _HALO_PX, cv2.INPAINT_NS).astype(np.float32)
-    smooth = cv2.GaussianBlur(without, (0, 0), _COMPARED_PX)
+    without = cv2.inpaint(light.astype(np.uint8), wide, _INPAINT_PX, cv2.INPAINT_NS).astype(np.float32)
+    smooth = cv2.GaussianBlur(without, (0, 0), _INPAINTED_BLUR_PX)
     return np.where(places[..., None], light - smooth, np.float32(0))

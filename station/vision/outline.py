@@ -15,10 +15,10 @@ from station.vision.contour import Edge, find_edge, inside_image
 from station.vision.region import Region
 from station.vision.working import SUBPIXEL_BITS
 
-_WITHIN, _BEYOND = 0.8, 1.2
-"""Of the region's radius: where the fall of its level across its end is read."""
 _MARGIN_PX = 6
 """At half the working size, around a textured body: as far as its segmentation's windows reach, and a pixel more."""
+_WITHIN, _BEYOND = 0.8, 1.2
+"""Of the region's radius: where the fall of its level across its end is read."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

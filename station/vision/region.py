@@ -14,15 +14,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from station.vision.background import (
-    CALMEST,
-    LEAST_BACKGROUND,
-    Background,
-    quantile,
-    quantiles,
-    thinned,
-    weighted_median,
-)
+from station.vision.background import LEAST_BACKGROUND, Background, quantile, quantiles, thinned, weighted_median
 from station.vision.constants import NORMAL_OF_MEDIAN, Constants
 from station.vision.contact import FloatImage, Mask
 from station.vision.contour import Rays, closed_path
@@ -34,12 +26,15 @@ _STEPS = 80
 """On a ray. Resolution: a fortieth of the radius."""
 _FIRST_EVERY = 2
 """Of the first pass, which has every second ray and step only. Resolution."""
+_FLOOR_QUANTILE = 0.03
+"""Of a field without background: nearly its least."""
 _LEAST_WINDOW_PX = 1.5
 """Of the level's window, at half the working size. At 1 the fit's cost is 0.002 higher."""
 _LEAST_RADIUS_PX = 3.0
 """At half the working size, 0.3 mm: what is smaller has no window of its own."""
-_STRONGEST_QUANTILE = 0.97
-"""Of a region's curvature: the strongest, less what noise adds. At 0.9 the fit's cost is 0.001 to 0.003 higher."""
+_STRONG_QUANTILE, _STRONGEST_QUANTILE = 0.9, 0.97
+"""Of a region's curvature: its strong part, and the strongest less what noise adds. With 0.9 for both the fit's cost is
+0.001 to 0.003 higher."""
 
 _Floats = npt.NDArray[np.float64]
 
@@ -206,8 +201,10 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
     Without background the halo's level is the body's; achenes and drupelets curve the gel, and the halo does not.
     """
     p = constants
-    cap = max(quantile(moved.curvature[region > 0], p.curved_quantile), NEXT_TO_NOTHING)
-    gain = _clipped(moved.curvature, cap) - np.float32(p.curved_share)
+    halo = min(p.halo_over_least * quantile(thinned(moved.curvature), _FLOOR_QUANTILE), p.halo_curvature)
+    curvature = np.sqrt(np.maximum(np.square(moved.curvature) - np.float32(halo**2), 0), dtype=np.float32)
+    cap = max(quantile(curvature[region > 0], p.curved_quantile), NEXT_TO_NOTHING)
+    gain = _clipped(curvature, cap) - np.float32(p.curved_share)
     curved_radii = _most_gained(gain, rays, p.region_span * rays.reach(region), 1, p.path_stiffness)
     curved = _drawn(rays, curved_radii, 1, (region.shape[0], region.shape[1]))
     return (curved, curved_radii) if curved.any() else (region, radii)
@@ -216,7 +213,7 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
 def _is_skin(moved: Movement, halved: Movement, region: Mask, agreed: float, constants: Constants) -> bool:
     """Whether the change turns from place to place; the larger the body, the more places there are to disagree."""
     p, radius = constants, radius_of(region)
-    if agreed >= p.smooth_small:  # with the places that have moved least: no skin agrees as much
+    if agreed >= p.smooth_small:  # with the places that have moved least: hardly any skin agrees as much
         return False
     smooth = min(p.smooth_small, p.smooth_at_one - p.smooth_per_size * float(np.log(radius)))
     return _coherence(moved, halved, region, p.coherence_window * radius, p.skin_left_out) < smooth
@@ -225,9 +222,9 @@ def _is_skin(moved: Movement, halved: Movement, region: Mask, agreed: float, con
 def _is_skin_by_curvature(moved: Movement, halved: Movement, region: Mask, constants: Constants) -> bool:
     """Whether a region is skin where there is hardly any background, so that directions say little.
 
-    Skin is what is finer than the body's own slopes, times how much the strongest of it curves.
+    Skin is what is finer than the body's own slopes, times how much the strongest tenth curves.
     """
-    strong = quantile(moved.curvature[region > 0], _STRONGEST_QUANTILE)
+    strong = quantile(moved.curvature[region > 0], _STRONG_QUANTILE)
     return _fine_share(halved.change, region, constants) * strong > constants.fine_on_skin
 
 
@@ -292,7 +289,7 @@ def level_of(moved: Movement, window_px: float) -> Level:
 def _in_background(few: FloatImage, moved: Movement) -> float:
     """The median of a thinned field in the background, or nearly its least where there is hardly any."""
     if moved.share < LEAST_BACKGROUND:
-        return quantile(few, CALMEST)
+        return quantile(few, _FLOOR_QUANTILE)
     return weighted_median(few, thinned(moved.weight))
 
 
@@ -317,7 +314,7 @@ def _coherence(moved: Movement, halved: Movement, region: Mask, window_px: float
     mean_square = np.asarray(cv2.GaussianBlur(moved.squared, (0, 0), window_px), np.float32)
     seen = moved.share >= LEAST_BACKGROUND
     floors = [
-        weighted_median(one, moved.weight) if seen else quantile(thinned(one), CALMEST)
+        weighted_median(one, moved.weight) if seen else quantile(thinned(one), _FLOOR_QUANTILE)
         for one in (length_squared(smooth), mean_square)
     ]
     cast = np.array(cv2.mean(moved.change, region))

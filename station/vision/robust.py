@@ -20,7 +20,6 @@ from station.vision.constants import CONSTANTS, Constants
 from station.vision.contact import Contact, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.curvature import curvature, curvature_noise, first_background
 from station.vision.debris import Debris
-from station.vision.image_quality import DEAD_LED
 from station.vision.outline import Outline, find_outline
 from station.vision.reference_check import ReferenceCheck
 from station.vision.region import (
@@ -181,7 +180,7 @@ class RobustMethod:
         if "flat field" in without:
             self._flat_field = np.ones_like(self._flat_field)
         means = np.asarray(cv2.mean(light)[:3])
-        lit = np.asarray(means > DEAD_LED * means.max())  # a dead LED's colour adds nothing to what curves
+        lit = np.asarray(means > constants.lit_share * means.max())  # a dead LED's colour adds nothing to what curves
         self._debris = Debris(light)
         self._clean = resized(self._debris.clean, self._quarter)
         # The detector needs the mean of the references: a median's noise is not that of the frames.

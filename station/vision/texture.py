@@ -59,7 +59,7 @@ def union(length: FloatImage, region: Mask, level: float, constants: Constants) 
     smooth = cv2.GaussianBlur(length, (0, 0), _BLUR_PX)
     near = np.asarray(cv2.dilate(region, room), np.uint8)
     pressed = (smooth > level).astype(np.uint8) & near
-    # How much of the place two levels leave of which one is twice the other.
+    # How much of the place a level 0.7 and one 1.4 times as high leave: twice the level, so to say.
     low, high = (1 + np.count_nonzero((smooth > factor * level) & (near > 0)) for factor in _LEVELS_TRIED)
     sure = 1 / (1 + (np.log(low / high) / constants.half_sure) ** 2)
     bridged = cv2.morphologyEx(pressed, cv2.MORPH_CLOSE, groove)

@@ -24,12 +24,17 @@ _REACH = 3.5
 """Standard deviations of the dent to which its filter reaches. Resolution: beyond is 0.05 % of it."""
 _COSINES_DOWN = 7
 """With a parabola, since drift may slope at the border where cosines are level."""
-_LEVELS = (12.0, 224.0)
-"""Grey levels beyond which noise and drift reach the ends of the scale, where drift has edges."""
-_WINSORISED = 2.0
-"""Standard deviations at which the noise is cut off (winsorised) before its correlation is counted."""
+_LEVELS, _MOST_CUT_OFF = (12.0, 224.0), 0.05
+"""Beyond these noise and drift reach the ends of the scale, where drift has edges; and how much of a column may be."""
+_PATTERN_SIGMA_PX = 2.0
+"""The reference's own noise must not pass for its pattern: the change has the same noise."""
+_WINSORISED, _RIDGE = 2.0, 0.05
+"""Standard deviations at which noise is cut off before the colours' correlation is counted, and how much of that is not
+believed."""
 _EVERY, _BORDER_PX = 2, 8
 """Noise is counted at every second place, away from the border, where there is less of it."""
+_LEAST_VALID, _RIM_PX = 0.5, 9
+"""Where the reference is valid in less of a region it says nothing; and the rim in which slopes count as the region's."""
 _LARGE_SHARE = 0.1
 """Of the frame."""
 
@@ -76,7 +81,7 @@ class WeakContactDetector:
         dent = np.exp(-np.square(x / sigma_px) / 2)
         self._dent, self._slope = dent / dent.sum(), -x * dent / dent.sum()
         cut_off = (((reference < _LEVELS[0]) | (reference > _LEVELS[1])) & lit).any(axis=2)
-        blind = (cut_off | (clean == 0)).astype(np.uint8)
+        blind = (cut_off | (cut_off.mean(axis=0) > _MOST_CUT_OFF) | (clean == 0)).astype(np.uint8)
         side = 2 * self._reach_px + 1
         around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
         self._valid = (cv2.dilate(blind, around) == 0).astype(np.float32)
@@ -84,17 +89,15 @@ class WeakContactDetector:
         orders = np.arange(min(_COSINES_DOWN, max(1, height // 4)))
         slow = [np.cos(np.pi * (down + 0.5) * orders), down, down**2]
         self._slow = np.linalg.qr(np.concatenate(slow, axis=1))[0].astype(np.float32)
-        self._known = self._drifts_of(reference, constants.pattern_blur / 2)
+        self._known = self._drifts_of(reference)
 
-    def _drifts_of(self, reference: FloatImage, blur_px: float) -> FloatImage:
+    def _drifts_of(self, reference: FloatImage) -> FloatImage:
         """What the reference turns into as its light gains or its pattern moves, per colour orthonormal.
-
-        The reference's own noise must not pass for its pattern: the change has the same noise.
 
         Returns:
             Shape (3, height x width, 5).
         """
-        pattern = cv2.GaussianBlur(reference, (0, 0), blur_px)
+        pattern = cv2.GaussianBlur(reference, (0, 0), _PATTERN_SIGMA_PX)
         across, down = (np.linspace(-1, 1, side, dtype=np.float32) for side in reference.shape[1::-1])
         moved = (cv2.Sobel(pattern, cv2.CV_32F, dx, dy) for dx, dy in ((1, 0), (0, 1)))
         known = [pattern, pattern * across[:, None], pattern * down[:, None, None], *moved]
@@ -152,17 +155,18 @@ class WeakContactDetector:
         return slice(max(0, y - reach_px), y + reach_px + 1), slice(max(0, x - reach_px), x + reach_px + 1)
 
     def supports(self, region: Mask, response: WeakResponse) -> bool:
-        """Whether a region's slopes are more than noise and drift; True where the reference is nowhere valid.
+        """Whether a region's slopes are more than noise and drift; True where the reference is not valid enough to say.
 
         Args:
             region: shape (height, width), 0 or not.
             response: from `response`.
         """
-        if not self._valid[region > 0].any():
+        if np.mean(self._valid[region > 0]) < _LEAST_VALID:
             return True
+        with_rim = cv2.dilate(region, np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0
         # A large contact's own slopes are what raises the ratio, and no codec.
         compression = response.compression if np.mean(region > 0) < _LARGE_SHARE else 1.0
-        return float(response.field[region > 0].max()) > self.threshold * compression
+        return float(response.field[with_rim].max()) > self.threshold * compression
 
 
 def _inner(field: FloatImage) -> FloatImage:
@@ -195,7 +199,7 @@ def _in_units_of_noise(slopes: FloatImage, spread: FloatImage) -> FloatImage:
     noise = np.clip(_inner(slopes) / spread, -_WINSORISED, _WINSORISED)
     common = noise.T @ noise
     size = np.sqrt(np.maximum(common.diagonal(), NEXT_TO_NOTHING))
-    common = common / np.outer(size, size) + NEXT_TO_NOTHING * np.eye(3)
+    common = (1 - _RIDGE) * common / np.outer(size, size) + _RIDGE * np.eye(3)
     apart = np.linalg.inv(np.linalg.cholesky(common)) / spread
     alone = cv2.transform(slopes, apart.astype(np.float32))
     return length_squared(np.asarray(alone, np.float32))
