@@ -34,7 +34,7 @@ believed."""
 _EVERY, _BORDER_PX = 2, 8
 """Noise is counted at every second place, away from the border, where there is less of it."""
 _LEAST_VALID, _RIM_PX = 0.5, 9
-"""Where the reference is valid in less of a region it says nothing; and the rim in which slopes count as the region's."""
+"""Where the reference is valid in less of a region it says nothing; and the rim whose slopes count as the region's."""
 _LARGE_SHARE = 0.1
 """Of the frame."""
 
