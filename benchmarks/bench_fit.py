@@ -148,8 +148,8 @@ def reference(runner: Runner, images: Path) -> None:
     lines = [
         "The statistic of `station/vision/reference_check.py` over its threshold; above 1 a frame is flagged as of",
         "another unit. The thresholds were chosen on these images, and on them with noise, drift and compression. The",
-        "twin's units share a few modes of light, so that some cannot be told apart; a lens that has fogged over takes",
-        "away the pattern by which a unit is known.",
+        "twin's units share a few modes of light, so that some cannot be distinguished; a lens that has fogged over",
+        "takes away the pattern by which a unit is known.",
         "",
         *reference_table(runner.parts, images),
     ]

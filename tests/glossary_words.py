@@ -50,7 +50,7 @@ MEANT: dict[str, tuple[str, ...]] = {
     "call off": ("station/commands/grip.py", "station/runtime/production/plc_commands.py"),
     "damaged passed": ("docs/grr.md",),  # column headings of a result
     "frame": ("plc_interface/server/exceptions.py", "plc_interface/server/mbap.py"),
-    "gate": ("station/calibration/gate.py", "station/vision/robust.py"),  # the recipe's `gate_ratio`, the detail `gate`
+    "gate": ("station/calibration/gate.py",),  # the recipe's `gate_ratio`
     "look": (
         "docs/alarms.md",  # a person does
     ),

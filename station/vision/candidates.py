@@ -16,11 +16,11 @@ _FOOT_SHARE = 0.5
 _STRONG_SHARE, _LOW_QUANTILE = 0.6, 0.3
 """Of the strongest curvature, what counts as curved; and the quantile of the level there that a body mostly reaches."""
 _OVER_SPREAD = 3.0
-"""In standard deviations of the background's level: a candidate stands out by as much."""
+"""In standard deviations of the background's level: a candidate is as far above it."""
 _OWN_SHARE = 0.35
 """Of its own strongest place: what belongs to one of several contacts, so that a strong neighbour hides none."""
 _WEAK_RADIUS_PX = 7
-"""At half the working size: a contact of 2 mm², where a weak one is looked for."""
+"""At half the working size: a contact of 2 mm², where a weak one is searched for."""
 _NECKS, _NECK_DEPTH = (0.4, 0.55, 0.7, 0.8), 0.12
 """Of the greatest depth: where several contacts are parted, and by how much both sides have to be deeper."""
 

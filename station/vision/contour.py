@@ -20,7 +20,7 @@ from station.vision.contact import FloatImage, Mask
 RAYS = 64
 """Around a contact. Resolution: 5.6° apart."""
 _FIRST_SHARES, _SECOND_SHARES = np.linspace(0.3, 1.2, 32), np.linspace(0.6, 1.4, 64)
-"""In radii, where the edge is looked for about the region's middle and about the first path's."""
+"""In radii, where the edge is searched for about the region's middle and about the first path's."""
 _LONGEST_JUMP = 2
 """Steps from ray to ray, at a price that rises with their square. Resolution of the path."""
 _SIDE_SHARE = 0.15

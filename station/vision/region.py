@@ -33,8 +33,8 @@ _LEAST_WINDOW_PX = 1.5
 _LEAST_RADIUS_PX = 3.0
 """At half the working size, 0.3 mm: what is smaller has no window of its own."""
 _SURELY_SMOOTH = 0.7
-"""Coherence, with the places that have moved least, from which a second look is spared: of 1,182 regions of the fit's
-data none above 0.62 is skin."""
+"""Coherence, with the places that have moved least, from which it is not measured once more: of 1,182 regions of
+the fit's data none above 0.62 is skin."""
 _STRONG_QUANTILE, _STRONGEST_QUANTILE = 0.9, 0.97
 """Of a region's curvature: its strong part, and the strongest less what noise adds. With 0.9 for both the fit's cost is
 0.001 to 0.003 higher."""
