@@ -10,7 +10,7 @@ where each way ends.
 import argparse
 import asyncio
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -19,7 +19,6 @@ import cv2
 import numpy as np
 from sections import write
 from sorting.specimens import CALIBRATION_SD, KINDS, Specimen, Task, draw
-from sorting.sweep import COUNT_MM, FRAME_S, at_count, swept
 
 from station.inspection.fruit_size import FruitSize
 from station.inspection.press import Press
@@ -27,6 +26,7 @@ from station.inspection.sized_limits import sized_limits
 from station.inspection.uncertainty import budget_at
 from station.press.measurement import measured_point
 from station.press.stop import ends_steps, steps_to_decide
+from station.settings.gripper import GripperCalibration
 from station.settings.recipe import Recipe, find_recipe
 from station.studies.gauge_grip import FruitRig, Grip, Onset
 from station.studies.workers import on_this_machine
@@ -39,8 +39,42 @@ DECISIONS = Path(__file__).resolve().parents[1] / "docs" / "decisions"
 AREAS = DECISIONS / "0060-stepped-measurement-at-rest.md"
 FORCES = DECISIONS / "0063-measurement-while-the-jaws-close.md"
 GROUPS = ("sound", "severe")
+COUNT_MM = GripperCalibration().mm_per_count
+FRAME_S = 1 / 30
+JITTER_S = 0.005
+"""Standard deviation of a frame's time against the gripper's reading: USB frames are stamped when they have come."""
 RUNS_ON_MM = 0.7
 """So far the fingers run on after the frame that stops them: the most that was measured, docs/cycle-time.md."""
+
+
+def swept(
+    tracker: PressTracker,
+    rig: FruitRig,
+    recipe: Recipe,
+    onset: Onset,
+    deepest_mm: float,
+    generator: np.random.Generator,
+) -> Iterator[tuple[float, Contact]]:
+    """Close from the onset at the recipe's speed without a stop, one frame after the other.
+
+    Args:
+        tracker: measures the frames.
+        rig: with the fruit.
+        recipe: its speed.
+        onset: where the closing counts from.
+        deepest_mm: the last closing.
+        generator: of the frames' phase and jitter.
+
+    Yields:
+        The closing as it is known, mm, and the contact.
+    """
+    speed_mm_s = recipe.gripper.speed_mm_s
+    closing_mm = float(generator.uniform(0.0, speed_mm_s * FRAME_S))
+    while closing_mm < deepest_mm + speed_mm_s * FRAME_S:
+        known_mm = closing_mm + speed_mm_s * float(generator.normal(0.0, JITTER_S))
+        frame = rig.images_at(onset.width_mm - closing_mm, 1)[0]
+        yield known_mm, tracker.measure_step([frame.image])
+        closing_mm += speed_mm_s * FRAME_S
 
 
 class Pair(NamedTuple):
@@ -154,6 +188,11 @@ def bear(task: Task) -> Borne | None:
         return Squeeze(one.fruit, Gel(mm_per_px=one.mm_per_px), held_s).at(late_mm + closing_mm).force_n
 
     return Borne(task, last_mm, deepest_mm, force_n(last_mm, steps - 1), force_n(deepest_mm, more_steps))
+
+
+def at_count(closing_mm: float) -> float:
+    """The closing that the gripper reaches."""
+    return round(closing_mm / COUNT_MM) * COUNT_MM
 
 
 def closed_on(one: Specimen, recipe: Recipe, onset: Onset, rig: FruitRig, grip: Grip) -> tuple[float, int]:

@@ -165,14 +165,10 @@ def as_stopped(
         resolution_mm=GripperCalibration().mm_per_count,
         scale_uncertainty=scale_uncertainty,
     )
-    told = False
     for step in pressed.steps:
         press = replace(press, points=(*press.points, _measured(step, mm_per_px)))
-        ends = ends_steps(together([*earlier, press]), recipe)
-        # Where a frame on the way ends the motion, the image at rest is asked; the next frame stands for it here.
-        if ends and (told or not step.on_the_way):
+        if ends_steps(together([*earlier, press]), recipe):
             break
-        told = ends
     return press, len(press.points)
 
 

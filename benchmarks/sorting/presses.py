@@ -12,7 +12,6 @@ from typing import NamedTuple
 import cv2
 
 import station
-from station.press.stop import steps_to_decide
 from station.settings.recipe import find_recipe
 from station.studies.gauge_grip import FruitRig, Grip
 from station.studies.workers import on_this_machine
@@ -21,7 +20,6 @@ from station.twin.squeeze import Squeeze
 from station.vision.contact import Contact
 
 from .specimens import SOUND, Task, draw
-from .sweep import close_on_the_way
 
 _DEEPEST_MM = 5.0
 """Two steps beyond the last threshold, where every fruit is decided."""
@@ -63,8 +61,6 @@ class Step(NamedTuple):
     """From the field's middle to the contact's, x to the right and y down; None without a contact."""
     force_n: float
     """The true one, before the flesh creeps."""
-    on_the_way: bool = False
-    """Measured while the jaws closed on."""
 
 
 class Pressed(NamedTuple):
@@ -86,9 +82,7 @@ def press(closing: Closing) -> tuple[Closing, Pressed]:
     one, recipe = draw(closing.task), find_recipe(closing.task.kind)
     x_mm, y_mm = closing.shift_mm
     pose = replace(one.pose, x_px=one.pose.x_px + x_mm / one.mm_per_px, y_px=one.pose.y_px + y_mm / one.mm_per_px)
-    noise_seed = one.noise_seed + closing.number
-    rig = FruitRig(one.fruit, pose, one.unit, noise_seed, one.mm_per_px)
-    grip = Grip(recipe, rig)
+    grip = Grip(recipe, FruitRig(one.fruit, pose, one.unit, one.noise_seed + closing.number, one.mm_per_px))
     onset = grip.approach(one.phase)
     if onset is None:
         return closing, Pressed(None, 0.0, ())
@@ -98,7 +92,9 @@ def press(closing: Closing) -> tuple[Closing, Pressed]:
     deepest_mm = _EARLY_STOP_MM if pressed_on else _DEEPEST_MM
     steps: list[Step] = []
 
-    def seen(closing_mm: float, contact: Contact, *, on_the_way: bool) -> None:
+    def goes_on(closing_mm: float, contact: Contact) -> bool:
+        if closing_mm > deepest_mm:
+            return False
         centre = contact.centroid_px
         steps.append(
             Step(
@@ -108,23 +104,11 @@ def press(closing: Closing) -> tuple[Closing, Pressed]:
                 tuple(sorted(flag.value for flag in contact.flags)),
                 None if centre is None else (centre[0] - middle_x, centre[1] - middle_y),
                 squeeze.at(one.fruit.width_mm - onset.width_mm + closing_mm).force_n,
-                on_the_way,
             )
         )
-
-    def passing(closing_mm: float, contact: Contact) -> None:
-        seen(closing_mm, contact, on_the_way=True)
-
-    def goes_on(closing_mm: float, contact: Contact) -> bool:
-        if closing_mm > deepest_mm:
-            return False
-        seen(closing_mm, contact, on_the_way=False)
         return True
 
-    if recipe.steps.measured == "while_closing":
-        close_on_the_way(grip, rig, recipe, onset, noise_seed, passing, goes_on)
-    else:
-        grip.close(onset, goes_on)
+    grip.close(onset, goes_on)
     return closing, Pressed(onset.width_mm + one.zero_mm, onset.uncertainty_mm, tuple(steps))
 
 
@@ -191,9 +175,7 @@ def _made_by(kind: str) -> str:
     if kind not in _hashes:
         root, recipe = Path(station.__file__).parent, find_recipe(kind)
         digest = hashlib.sha256(Path(__file__).with_name("specimens.py").read_bytes())
-        digest.update(Path(__file__).with_name("sweep.py").read_bytes())
-        way = f"{recipe.steps.measured}{recipe.steps.step_mm}{recipe.gripper!r}{steps_to_decide(recipe)}"
-        digest.update(f"{way}{recipe.segmentation!r}{recipe.imaging!r}".encode())
+        digest.update(f"{recipe.steps.step_mm}{recipe.segmentation!r}{recipe.imaging!r}".encode())
         for name in _DECIDED_BY:
             place = root / name
             for file in [place] if place.is_file() else sorted(place.rglob("*.[pn][yp]*")):
