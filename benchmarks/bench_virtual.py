@@ -132,7 +132,7 @@ def sections_of(results: Sequence[Result]) -> dict[str, list[str]]:
             f"- {max(memory[:_SHOWN_EVERY]):.0f} MB was the most that a process held in the first {_SHOWN_EVERY}",
             f"  stories, {max(memory):.0f} MB in all.",
             f"- Stories by the checksum of the code: {', '.join(f'{name}: {n:,}' for name, n in codes.items())}.",
-            f"- {mended} of the stories broke a law at first, and hold every one since its cause was mended.",
+            f"- Stories that broke a law at first, and hold every one since its cause was mended: {mended}.",
             "- " + ", ".join(f"{decided[name]:,} {name}" for name in DECISIONS) + ".",
         ],
         "laws": [

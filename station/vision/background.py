@@ -24,7 +24,7 @@ _HIGHEST_COSINE = 4
 _ITERATIONS = 3
 """Of the re-weighting. Resolution: with 2 the fit's cost is 0.01 higher."""
 _LEAST_KNOWN = 0.05
-"""Share of the known background below which the priors are drawn in no further, and the spread is not measured."""
+"""Of `known_share`, below which the priors are drawn in no further; of the frame, below which no spread is measured."""
 LEAST_BACKGROUND = 0.02
 """Share of the frame below which nothing is counted in the background, since there is hardly any."""
 _TUKEY_WIDTH = 3.0

@@ -20,7 +20,7 @@ _OVER_SPREAD = 3.0
 _OWN_SHARE = 0.35
 """Of its own strongest place: what belongs to one of several contacts, so that a strong neighbour hides none."""
 _WEAK_RADIUS_PX = 7
-"""At half the working size: a contact of 2 mm², where a weak one is searched for."""
+"""At half the working size: a contact of about 2 mm², where a weak one is searched for."""
 _NECKS, _NECK_DEPTH = (0.4, 0.55, 0.7, 0.8), 0.12
 """Of the greatest depth: where several contacts are parted, and by how much both sides have to be deeper."""
 

@@ -13,11 +13,11 @@ from station.vision.contact import FloatImage
 from station.vision.working import NEXT_TO_NOTHING, length_squared, resized
 
 _FINE_PX, _LENGTH_PX = (1.0, 4.0), 1.5
-"""At half the working size, of the Gaussians between which a particle is, about 0.2 to 0.9 mm, and of its strength."""
+"""At half the working size, of the Gaussians between which a particle is, 0.1 to 0.4 mm, and of its strength."""
 _LEAST_LEVELS = 10.0
 """Of what is fine in the reference: without debris it reaches 6 on the twin and 8 on the real presses' reference."""
 _RING_PX, _HALO_PX = 9, 5
-"""At half the working size: over a particle's dark middle, and what it changes around it; 0.5 and 0.3 mm."""
+"""At half the working size: over a particle's dark middle, and what it changes around it; kernels of 1.0 and 0.5 mm."""
 _LONGEST_PX = 40
 """At half the working size, about 4 mm, two particles side by side: what is longer is the edge of a beam of light."""
 _INPAINT_PX, _INPAINTED_BLUR_PX = 3, 2.0

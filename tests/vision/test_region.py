@@ -72,6 +72,12 @@ def test_directions_that_turn_from_place_to_place_are_texture(moved):
     assert [one.textured for one in regions] == [False, True]
 
 
+def test_slopes_that_agree_by_half_are_measured_once_more_and_are_texture(moved):
+    found = region(moved(smooth(32) + textured(32, levels=3.0)), start(32))
+    assert 0.4 < found.coherence < 0.7
+    assert found.textured
+
+
 def test_texture_that_is_known_from_an_earlier_step_is_taken_over(moved):
     assert region(moved(smooth(32)), start(32), texture=True).textured
     assert not region(moved(textured(32)), start(32), texture=False).textured
