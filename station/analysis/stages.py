@@ -20,6 +20,8 @@ class StagedMethod:
         on_stage: StageSink | None = None,
         previous: Contact | None = None,
         agreed: float = 1.0,
+        *,
+        firm_only: bool = False,
     ) -> Contact:
         """See `Method.measure`."""
         self.pictures = {}
@@ -29,4 +31,4 @@ class StagedMethod:
             if on_stage is not None:
                 on_stage(name, picture)
 
-        return self._method.measure(image, keep, previous, agreed)
+        return self._method.measure(image, keep, previous, agreed, firm_only=firm_only)

@@ -47,7 +47,22 @@ class PressMeasurement:
         if self._tracker is not None:
             self._tracker.prepare_next(image)
         else:
-            self._known[id(image)] = image, self._method.measure(image)
+            self._known[id(image)] = image, self._method.measure(image, firm_only=True)
+
+    def seek(self, step: Step) -> MeasuredStep:
+        """Measure a step of the approach, where only a firm contact counts.
+
+        Args:
+            step: with frames of the reference's shape.
+        """
+        if self._tracker is not None or len(step.images) > 1:
+            return self.measure(step)
+        [image] = step.images
+        known = self._known.get(id(image))
+        contact = self._method.measure(image, firm_only=True) if known is None else known[1]
+        # The frame that shows the contact first is one of those that confirm it.
+        self._known = {id(image): (image, contact)}
+        return MeasuredStep(step, image, contact)
 
     def measure(self, step: Step) -> MeasuredStep:
         """Find the contact in a step's frames.
@@ -55,14 +70,14 @@ class PressMeasurement:
         Args:
             step: with frames of the reference's shape.
         """
+        image = step.image
         if self._tracker is not None:
-            return MeasuredStep(step, step.image, self._tracker.measure_step(step.images))
-        known = {key: contact for key, (_, contact) in self._known.items()}
-        contact = measure_step(self._method, step.images, known=known)
+            return MeasuredStep(step, image, self._tracker.measure_step(step.images, image))
+        # A weak contact was not searched for in the others.
+        known = {key: contact for key, (_, contact) in self._known.items() if contact.is_firm}
+        contact = measure_step(self._method, step.images, known=known, mean=image)
         self._known.clear()
-        if len(step.images) == 1:  # the frame that shows the contact first is one of those that confirm it
-            self._known[id(step.images[0])] = step.images[0], contact
-        return MeasuredStep(step, step.image, contact)
+        return MeasuredStep(step, image, contact)
 
 
 def measured_point(contact: Contact, closing_mm: float, mm_per_px: float) -> Measured:

@@ -127,8 +127,9 @@ async def onset(rig: Rig, recipe: Recipe, opened: Position, measure: Measure, lo
     from_mm = opened.width_mm
     while True:  # back to where nothing touches, however faintly it began
         # From the measured width: asked for from between two counts, a finest step may be two counts.
-        met_mm, before, touching = await search.first_contact(opened.width_mm, opened)
-        if before is not None or from_mm >= rig.widest_mm:
+        wider = from_mm < rig.widest_mm
+        met_mm, before, touching = await search.first_contact(opened.width_mm, opened, seen_clear=wider)
+        if before is not None or not wider:
             return await search.confirmed(met_mm, before, touching)
         from_mm += recipe.steps.step_mm
         opened = await rig.open(min(from_mm, rig.widest_mm))
@@ -192,23 +193,40 @@ class _Search:
     def __init__(self, rig: Rig, recipe: Recipe, lowest_mm: float, measure: Measure) -> None:
         self._rig, self._recipe, self._lowest_mm, self._measure = rig, recipe, lowest_mm, measure
 
-    async def first_contact(self, from_mm: float, at: Position | None = None) -> tuple[float, Step | None, Step]:
+    async def first_contact(
+        self, from_mm: float, at: Position | None = None, *, seen_clear: bool = False
+    ) -> tuple[float, Step | None, Step]:
         """Return the width asked for where the gel was touched first, the step before it, and that step.
 
         Args:
             from_mm: where the search begins.
             at: the fingers where they are there already.
+            seen_clear: nothing touched there before, so that the fingers close on while it is measured again. Where
+                something does touch, they are up to a finest step further than that step then.
         """
         width_mm, before = from_mm, None
         while width_mm >= self._lowest_mm:
             move = at or await self._rig.close_to(width_mm)
-            seen = await self._measure(Step(-1, move, await self._rig.frames(1)))
+            step, next_mm = Step(-1, move, await self._rig.frames(1)), width_mm - self._rig.finest_step_mm
+            if seen_clear and not move.held and next_mm >= self._lowest_mm:
+                seen, at = await self._measured_closing_on(step, next_mm)
+            else:
+                seen, at = await self._measure(step), None
             if stop.touches(seen):
                 return width_mm, before, seen.step
             if seen.step.move.held:
                 raise stop.nothing_touched(self._recipe, seen.step.move)
-            width_mm, before, at = width_mm - self._rig.finest_step_mm, seen.step, None
+            width_mm, before, seen_clear = next_mm, seen.step, False
         raise stop.nothing_touched(self._recipe)
+
+    async def _measured_closing_on(self, step: Step, width_mm: float) -> tuple[MeasuredStep, Position]:
+        """Measure a step while the fingers close to a width, and return where they came to rest too."""
+        closing = asyncio.ensure_future(self._rig.close_to(width_mm))
+        try:
+            return await self._measure(step), await closing
+        finally:
+            closing.cancel()
+            await asyncio.gather(closing, return_exceptions=True)
 
     async def confirmed(self, width_mm: float, before: Step | None, touching: Step) -> Onset:
         """Confirm a contact by as many frames as a step has, at the same width; else search on.

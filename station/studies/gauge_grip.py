@@ -202,7 +202,7 @@ class Grip:
         start_mm = self._rig.counts_from_mm = self._rig.fruit.width_mm + _APPROACH_MM + phase * count_mm
 
         async def measure(step: Step) -> MeasuredStep:
-            return self._measurement.measure(step)
+            return self._measurement.seek(step)
 
         lowest_mm = start_mm - (_MOST_COUNTS - 0.5) * count_mm
         try:

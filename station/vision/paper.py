@@ -32,6 +32,8 @@ class PaperMethod:
         on_stage: StageSink | None = None,
         previous: Contact | None = None,
         agreed: float = 1.0,
+        *,
+        firm_only: bool = False,
     ) -> Contact:
         """Find the contact in an image as the paper prints it.
 
@@ -40,6 +42,7 @@ class PaperMethod:
             on_stage: gets the pictures `difference`, `denoised` and `segmented`.
             previous: has no part in the method as printed.
             agreed: nor has this.
+            firm_only: nor this: it finds no weak contacts.
 
         Raises:
             ValueError: the image's shape or dtype is not the reference's.

@@ -28,17 +28,18 @@ class PressTracker:
         """
         self._ahead[id(image)] = image, self._method.measure(image, previous=self._previous)
 
-    def measure_step(self, frames: Sequence[Image]) -> Contact:
+    def measure_step(self, frames: Sequence[Image], mean: Image | None = None) -> Contact:
         """Measure the frames of the next step, and follow its contact from now on.
 
         Args:
             frames: one or more of the reference's shape, dtype uint8, in which nothing has moved.
+            mean: their mean where it is there already.
 
         Raises:
             ValueError: there is no frame, or they are not of the reference's shape and of one dtype.
         """
         known = {key: contact for key, (_, contact) in self._ahead.items()}
         self._ahead.clear()
-        contact = measure_step(self._method, frames, self._previous, known)
+        contact = measure_step(self._method, frames, self._previous, known, mean)
         self._previous = contact
         return contact

@@ -124,6 +124,7 @@ class State:
     flags: set[Flag] = field(default_factory=set)
     confidence: float = 0.0
     agreed: float = 1.0
+    firm_only: bool = False
     """How far the step's frames agree, 0 to 1."""
 
 
@@ -219,6 +220,8 @@ class RobustMethod:
         on_stage: StageSink | None = None,
         previous: Contact | None = None,
         agreed: float = 1.0,
+        *,
+        firm_only: bool = False,
     ) -> Contact:
         """Find the contact in an image.
 
@@ -227,12 +230,13 @@ class RobustMethod:
             on_stage: gets the pictures named in `stages`.
             previous: the same contact at the last step of less compression; a single image is measured without.
             agreed: how far the frames agree of which the image is the mean, 0 to 1; the confidence is multiplied by it.
+            firm_only: leave out the search for weak contacts; an image with a firm one gives the same.
 
         Raises:
             ValueError: the image's shape or dtype is not the references'.
         """
         state = self._start(image, previous)
-        state.agreed = agreed
+        state.agreed, state.firm_only = agreed, firm_only
         difference = state.difference.copy() if on_stage else state.difference
         for stage in self.pipeline:
             stage(state)
@@ -375,7 +379,7 @@ class RobustMethod:
 
     def _find_weak_contact(self, state: State) -> None:
         """Search for a contact below the detection threshold where nothing was found."""
-        if state.outlines or "weak contact" in self._without:
+        if state.outlines or state.firm_only or "weak contact" in self._without:
             return
         place = self._weak.place(self._weak_response(state))
         least = self._constants.weak_least_curvature * state.threshold

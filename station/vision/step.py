@@ -13,6 +13,7 @@ def measure_step(
     frames: Sequence[Image],
     previous: Contact | None = None,
     known: Mapping[int, Contact] | None = None,
+    mean: Image | None = None,
 ) -> Contact:
     """Measure the mean of a step's frames, and doubt it as far as the frames measured one by one disagree.
 
@@ -23,6 +24,7 @@ def measure_step(
         frames: one or more of one shape (height, width, 3), dtype uint8, in which nothing has moved.
         previous: the contact of the press's step before; None where the step is measured by itself.
         known: contacts of frames that are measured already, by the frame's `id`.
+        mean: the frames' `mean_image` where it is there already.
 
     Returns:
         The mean image's contact, whose confidence is multiplied by the frames' `agreement`.
@@ -37,15 +39,17 @@ def measure_step(
         return known.get(id(frames[0])) or method.measure(frames[0], previous=previous)
     alone = [known.get(id(frame)) or method.measure(frame, previous=previous) for frame in frames]
     agreed = agreement([one.area_px for one in alone])
-    return method.measure(mean_image(frames), previous=previous, agreed=agreed)
+    return method.measure(mean_image(frames) if mean is None else mean, previous=previous, agreed=agreed)
 
 
 def mean_image(frames: Sequence[Image]) -> Image:
-    """The mean of frames, rounded.
+    """The mean of frames, rounded; of one frame itself.
 
     Args:
         frames: one or more of one shape, dtype uint8.
     """
+    if len(frames) == 1:
+        return frames[0]
     total = np.zeros(frames[0].shape, np.uint16)
     for frame in frames:
         total += frame

@@ -157,6 +157,41 @@ def test_the_search_goes_count_by_count_also_where_the_jaws_were_asked_to_open_b
         assert -np.diff([opened.width_mm, *widths_mm]) == pytest.approx(count_mm), over_mm
 
 
+def test_the_fingers_close_on_from_where_nothing_touched_while_that_is_measured_again():
+    class Closes(WrittenRig):
+        """Fingers whose moves can be waited for."""
+
+        def __init__(self) -> None:
+            super().__init__()
+            self.closing = asyncio.Event()
+
+        async def close_to(self, width_mm: float) -> Position:
+            self.closing.set()
+            return await super().close_to(width_mm)
+
+    async def scenario(opened_mm: float):
+        rig = Closes()
+        measured = list[float]()
+
+        async def measure(step: Step) -> MeasuredStep:
+            if not measured:
+                await rig.closing.wait()
+            measured.append(step.move.width_mm)
+            contact = SimpleNamespace(is_firm=bool(step.image.any()))
+            return cast("MeasuredStep", SimpleNamespace(step=step, contact=contact))
+
+        async with asyncio.timeout(10):
+            before, start = await onset(rig, BLUEBERRY, await rig.open(opened_mm), measure)
+        assert measured[0] == opened_mm
+        assert before is not None
+        assert before.move.width_mm >= FRUIT_MM > start.step.move.width_mm
+        assert before.move.width_mm - start.step.move.width_mm == pytest.approx(rig.finest_step_mm)
+
+    asyncio.run(scenario(FRUIT_MM + 0.1))
+    # A fruit that has come nearer meanwhile touches already: the jaws open again.
+    asyncio.run(scenario(FRUIT_MM - 0.1))
+
+
 def test_jaws_that_something_keeps_from_opening_further_have_the_onset_where_they_are():
     rig = WrittenRig(opens_to_mm=FRUIT_MM - 1.0)
 
@@ -234,19 +269,25 @@ def test_a_measurement_is_awaited_only_where_the_step_may_decide():
     assert not may_decide(BLUEBERRY, None)
 
 
-def test_a_frame_that_was_measured_in_the_search_is_not_measured_again_to_confirm_it():
-    measured: list[int] = []
+@pytest.mark.parametrize(
+    ("is_firm", "again"), [(True, [20, 60, 30]), (False, [10, 20, 60, 30])], ids=["firm", "perhaps weak"]
+)
+def test_a_frame_that_has_shown_a_firm_contact_in_the_search_is_not_measured_again_to_confirm_it(is_firm, again):
+    measured: list[tuple[int, bool]] = []
 
     class CountingMethod:
         """Remembers the level of each image that it measures."""
 
-        def measure(self, image: Any, previous: Any = None, agreed: float = 1.0) -> Any:
+        def measure(self, image: Any, previous: Any = None, agreed: float = 1.0, *, firm_only: bool = False) -> Any:
             assert previous is None
-            measured.append(int(image[0, 0, 0]))
-            return SimpleNamespace(confidence=None, area_px=0)
+            measured.append((int(image[0, 0, 0]), firm_only))
+            return SimpleNamespace(confidence=None, area_px=0, is_firm=is_firm)
 
     frames = tuple(SimpleNamespace(image=np.full((2, 2, 3), level, np.uint8)) for level in (10, 20, 60))
     measurement = PressMeasurement(cast("Any", CountingMethod()))
-    measurement.measure(Step(-1, Position(15.0), cast("Any", frames[:1])))
-    measurement.measure(Step(0, Position(15.0), cast("Any", frames)))
-    assert measured == [10, 20, 60, 30], "each frame once, then their mean"
+    measurement.prepare_next(frames[0].image)
+    sought = measurement.seek(Step(-1, Position(15.0), cast("Any", frames[:1])))
+    assert sought.contact.is_firm == is_firm
+    assert measured == [(10, True)], "no weak contact is searched for"
+    measurement.seek(Step(0, Position(15.0), cast("Any", frames)))
+    assert measured[1:] == [(level, False) for level in again], "each frame once, then their mean"

@@ -188,9 +188,9 @@ class Counting:
     def __init__(self, method):
         self.method, self.stages, self.measured = method, method.stages, []
 
-    def measure(self, image, on_stage=None, previous=None, agreed=1.0):
+    def measure(self, image, on_stage=None, previous=None, agreed=1.0, *, firm_only=False):
         self.measured.append(previous)
-        return self.method.measure(image, on_stage, previous, agreed)
+        return self.method.measure(image, on_stage, previous, agreed, firm_only=firm_only)
 
 
 @pytest.mark.parametrize("frames", [3, 1])

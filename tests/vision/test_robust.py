@@ -281,6 +281,22 @@ def test_without_the_weak_contact_detector_such_a_touch_is_not_found():
     assert not any(contact.found for contact in touches)
 
 
+def test_where_only_a_firm_contact_counts_a_weak_one_is_not_searched_for_and_a_firm_one_is_the_same():
+    press = render_press("blueberry", 502, (0.01, 0.02, 0.04, 0.08, 2.0))
+    method = RobustMethod(press.references, RobustParameters())
+    kinds = set()
+    for image in (press.references[0], *press.frames):
+        contact, firm = method.measure(image), method.measure(image, firm_only=True)
+        kinds.add((contact.found, contact.is_firm))
+        assert firm.is_firm == contact.is_firm
+        if contact.is_firm:
+            assert (firm.area_px, firm.confidence, firm.flags) == (contact.area_px, contact.confidence, contact.flags)
+            assert np.array_equal(firm.mask, contact.mask)
+        else:
+            assert not firm.found
+    assert kinds == {(False, False), (True, False), (True, True)}
+
+
 def test_of_a_contact_whose_middle_lies_at_the_border_no_wrong_area_is_judged():
     options = PressOptions(pose=Pose(257, 647), unit=20)
     for seed in range(60010, 60016):

@@ -385,4 +385,4 @@ class Inspector:
         """A step of the approach, measured by itself."""
         self._devices.monitors[CAMERA].report_success()
         self._devices.monitors[GRIPPER].report_success()
-        return await self._vision.measure(step)
+        return await self._vision.seek(step)

@@ -115,6 +115,14 @@ class VisionWorker:
         """
         return await self._do(lambda: self._referenced().measure(step))
 
+    async def seek(self, step: Step) -> MeasuredStep:
+        """Measure a step of the approach, where only a firm contact counts.
+
+        Args:
+            step: with frames of the reference's shape.
+        """
+        return await self._do(lambda: self._referenced().seek(step))
+
     def _referenced(self) -> PressMeasurement:
         if self._measurement is None:
             raise RuntimeError("a step is measured before the reference was taken")

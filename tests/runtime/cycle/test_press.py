@@ -26,8 +26,8 @@ def measurements(monkeypatch):
     def recording(references, segmentation):
         method = make_method(references, segmentation)
 
-        def measure(image, on_stage=None, previous=None, agreed=1.0):
-            found = method.measure(image, on_stage, previous, agreed)
+        def measure(image, on_stage=None, previous=None, agreed=1.0, *, firm_only=False):
+            found = method.measure(image, on_stage, previous, agreed, firm_only=firm_only)
             flags = found.flags | ({Flag.LOWER_BOUND} if made.lost and found.found else set())
             contact = replace(found, flags=flags, changed_area_px=2 * found.area_px)
             made.pairs.append((previous, contact))

@@ -48,10 +48,10 @@ def seen_images(monkeypatch, previous_contacts):
     def counting(references, segmentation):
         method = make_method(references, segmentation)
 
-        def measure(image, on_stage=None, previous=None, agreed=1.0):
+        def measure(image, on_stage=None, previous=None, agreed=1.0, *, firm_only=False):
             seen.append(id(image))
             previous_contacts.append(previous)
-            return method.measure(image, on_stage, previous, agreed)
+            return method.measure(image, on_stage, previous, agreed, firm_only=firm_only)
 
         return SimpleNamespace(stages=method.stages, measure=measure)
 
