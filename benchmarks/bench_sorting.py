@@ -3,7 +3,7 @@
 Run with `./run bench sorting`. Closings are imaged once and kept below `state/sorting`, by a hash of the code that
 draws and measures them; judging them by another recipe then takes seconds. `--count 300` images about 1,800 closings of
 each kind, 75 minutes on two cores, and can be interrupted and resumed. Writes the tables of `docs/sorting.md`, and the
-first one into `README.md`; other seeds and a part of the kinds print them only: what is tuned on must not be
+first one into `README.md`: with `--kinds` the rows of these. Other seeds print them only: what is tuned on must not be
 published as the result. `--limits` compares area limits on sound and mildly damaged fruit, to choose one.
 """
 
@@ -11,7 +11,7 @@ import argparse
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from sections import write
+from sections import with_rows, write
 from sorting import tables
 from sorting.cycle import Inspected, Practice, Unmeasured, inspect
 from sorting.presses import PRESSED_ON, Closing, PressCache
@@ -25,6 +25,10 @@ from station.twin.fruit import Kind
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT, README = ROOT / "docs" / "sorting.md", ROOT / "README.md"
 CACHE = ROOT / "state" / "sorting"
+FRUIT = 300
+"""Of each kind and damage, for the page."""
+KEYS = {"errors": 1, "why": 1, "worth": 2, "spared": 2}
+"""How many cells of each table say which row it is."""
 AS_PLACED = Practice(centring=False, second_press=False)
 OF_EACH_GROUP = 100
 """Fruit on which the practices are compared: without a size nearly all are pressed twice."""
@@ -70,10 +74,15 @@ def compare_limits(tasks: Sequence[Task], recipe: Recipe, limits: Iterable[str],
         print(tables.exchange(chosen, decided(tasks, recipes, [Practice()], cache)[Practice()]), flush=True)
 
 
+def named_kinds(lines: Sequence[str], kinds: Iterable[Kind]) -> list[str]:
+    """A table's head and the rows of some kinds."""
+    return [*lines[:2], *(line for line in lines[2:] if any(f"| {kind} |" in line for kind in kinds))]
+
+
 def main() -> None:
     """Inspect, print the tables, and write them where they are the result."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=300, help="fruit of each kind and damage; a third with a patch")
+    parser.add_argument("--count", type=int, default=FRUIT, help="fruit of each kind and damage; a third with a patch")
     parser.add_argument("--kinds", nargs="+", type=Kind, choices=KINDS, default=KINDS)
     parser.add_argument("--seeds", nargs="+", choices=SEEDS, default=["judging"])
     parser.add_argument("--recipes", type=Path, metavar="DIR", help="the folder of the recipes; else the shipped ones")
@@ -91,7 +100,7 @@ def main() -> None:
         for number in range(count)
     ]
     recipes: dict[str, Recipe] = {kind: find_recipe(kind, asked.recipes) for kind in asked.kinds}
-    cache = PressCache(CACHE, asked.processes)
+    cache = PressCache(CACHE, asked.processes, asked.recipes)
     if asked.limits:
         (kind,) = asked.kinds
         two_groups = [task for task in tasks if task.group in {SOUND, Severity.MILD}]
@@ -107,13 +116,15 @@ def main() -> None:
         "errors": tables.errors(all_of_it),
         "why": tables.diverted_why(all_of_it),
         "worth": tables.worth({name: compared[practice] for name, practice in tables.PRACTICES.items()}),
-        "spared": tables.spared(before, after, recipes),
+        "spared": tables.spared(before, after),
     }
     for lines in sections.values():
         print("\n".join(lines), end="\n\n")
-    if asked.seeds == ["judging"] and set(asked.kinds) == set(KINDS):
-        write(DOCUMENT, sections)
-        write(README, {"errors": sections["errors"]})
+    if asked.seeds == ["judging"] and asked.count == FRUIT and asked.recipes is None:
+        of_kinds = {name: named_kinds(lines, asked.kinds) for name, lines in sections.items()}
+        rows = {name: with_rows(DOCUMENT, name, lines, KEYS[name]) for name, lines in of_kinds.items()}
+        write(DOCUMENT, rows)
+        write(README, {"errors": rows["errors"]})
 
 
 if __name__ == "__main__":

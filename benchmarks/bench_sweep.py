@@ -1,16 +1,16 @@
 """Measuring while the jaws close, beside the stepped press, on fruit of the twin with its creep.
 
-Run with `./run bench sweep [--count N]`; writes the tables of `docs/decisions/0060-stepped-measurement-at-rest.md` and
-`docs/decisions/0063-measurement-while-the-jaws-close.md`. The same fruit, unit, noise and onset: once stepped as by the
-recipe, once closed at the gripper's slowest speed with one frame every 1/30 s, each with the width at its capture,
-known to the jitter of a frame's time. Compared are the areas at the damage limits' closings, and the force on the fruit
-where each way ends.
+Run with `./run bench sweep [--count N]`; writes the tables of `docs/decisions/0060-stepped-measurement-at-rest.md`,
+`0063-measurement-while-the-jaws-close.md` and `0085-pause-of-a-step.md`. The same fruit, unit, noise and onset: once
+stepped as by the recipe, once closed at the gripper's slowest speed with one frame every 1/30 s, each with the width at
+its capture, known to the jitter of a frame's time. Compared are the areas at the damage limits' closings, and the force
+on the fruit where each way ends; and the area after the shipped pause of a step with that after a longer one.
 """
 
 import argparse
 import asyncio
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 from sections import write
 from sorting.specimens import CALIBRATION_SD, KINDS, Specimen, Task, draw
+from sorting.sweep import COUNT_MM, FRAME_S, at_count, swept
 
 from station.inspection.fruit_size import FruitSize
 from station.inspection.press import Press
@@ -26,10 +27,10 @@ from station.inspection.sized_limits import sized_limits
 from station.inspection.uncertainty import budget_at
 from station.press.measurement import measured_point
 from station.press.stop import ends_steps, steps_to_decide
-from station.settings.gripper import GripperCalibration
 from station.settings.recipe import Recipe, find_recipe
 from station.studies.gauge_grip import FruitRig, Grip, Onset
 from station.studies.workers import on_this_machine
+from station.twin.contact import FruitOnGel
 from station.twin.gel import Gel
 from station.twin.squeeze import Squeeze
 from station.vision.contact import Contact
@@ -38,43 +39,12 @@ from station.vision.press import PressTracker
 DECISIONS = Path(__file__).resolve().parents[1] / "docs" / "decisions"
 AREAS = DECISIONS / "0060-stepped-measurement-at-rest.md"
 FORCES = DECISIONS / "0063-measurement-while-the-jaws-close.md"
+PAUSES = DECISIONS / "0085-pause-of-a-step.md"
 GROUPS = ("sound", "severe")
-COUNT_MM = GripperCalibration().mm_per_count
-FRAME_S = 1 / 30
-JITTER_S = 0.005
-"""Standard deviation of a frame's time against the gripper's reading: USB frames are stamped when they have come."""
+LONGER_PAUSE_S = 0.2
+"""The shipped recipes' until 2026-11-25."""
 RUNS_ON_MM = 0.7
 """So far the fingers run on after the frame that stops them: the most that was measured, docs/cycle-time.md."""
-
-
-def swept(
-    tracker: PressTracker,
-    rig: FruitRig,
-    recipe: Recipe,
-    onset: Onset,
-    deepest_mm: float,
-    generator: np.random.Generator,
-) -> Iterator[tuple[float, Contact]]:
-    """Close from the onset at the recipe's speed without a stop, one frame after the other.
-
-    Args:
-        tracker: measures the frames.
-        rig: with the fruit.
-        recipe: its speed.
-        onset: where the closing counts from.
-        deepest_mm: the last closing.
-        generator: of the frames' phase and jitter.
-
-    Yields:
-        The closing as it is known, mm, and the contact.
-    """
-    speed_mm_s = recipe.gripper.speed_mm_s
-    closing_mm = float(generator.uniform(0.0, speed_mm_s * FRAME_S))
-    while closing_mm < deepest_mm + speed_mm_s * FRAME_S:
-        known_mm = closing_mm + speed_mm_s * float(generator.normal(0.0, JITTER_S))
-        frame = rig.images_at(onset.width_mm - closing_mm, 1)[0]
-        yield known_mm, tracker.measure_step([frame.image])
-        closing_mm += speed_mm_s * FRAME_S
 
 
 class Pair(NamedTuple):
@@ -117,7 +87,9 @@ def compare(task: Task) -> list[Pair]:
 
     stepped.close(onset, goes_on)
     tracker = PressTracker(grip.method, first=onset.contact)
-    on_the_way = swept(tracker, rig, recipe, onset, closings_mm[-1], np.random.default_rng(one.noise_seed))
+    # One frame more, since the area at the last closing is interpolated.
+    end_mm = closings_mm[-1] + recipe.gripper.speed_mm_s * FRAME_S
+    on_the_way = swept(tracker, rig, recipe, onset, end_mm, np.random.default_rng(one.noise_seed))
     frames = [(0.0, onset.contact), *on_the_way]
     press = press_of(one, onset)
     limits = sized_limits(press, recipe)
@@ -190,11 +162,6 @@ def bear(task: Task) -> Borne | None:
     return Borne(task, last_mm, deepest_mm, force_n(last_mm, steps - 1), force_n(deepest_mm, more_steps))
 
 
-def at_count(closing_mm: float) -> float:
-    """The closing that the gripper reaches."""
-    return round(closing_mm / COUNT_MM) * COUNT_MM
-
-
 def closed_on(one: Specimen, recipe: Recipe, onset: Onset, rig: FruitRig, grip: Grip) -> tuple[float, int]:
     """Close without a stop as the station does, and on by steps where the image at rest does not decide.
 
@@ -222,8 +189,6 @@ def closed_on(one: Specimen, recipe: Recipe, onset: Onset, rig: FruitRig, grip: 
     rest_mm, closed = target_mm, steps_to_decide(recipe)
     way = swept(tracker, rig, recipe, onset, target_mm, np.random.default_rng(one.noise_seed))
     for closing_mm, contact in way:
-        if closing_mm >= target_mm:
-            break
         if ends(closing_mm, contact):
             rest_mm, closed = min(closing_mm + RUNS_ON_MM, target_mm), max(1, int(closing_mm / step_mm))
             break
@@ -256,15 +221,48 @@ def force_table(borne: Sequence[Borne]) -> list[str]:
     return lines
 
 
+def paused(task: Task) -> float:
+    """Compare the true area at the last limit with that after longer pauses.
+
+    Args:
+        task: which fruit.
+
+    Returns:
+        The area with the shipped pause over the one with `LONGER_PAUSE_S`.
+    """
+    one, recipe = draw(task), find_recipe(task.kind)
+    gel = Gel(mm_per_px=one.mm_per_px)
+    on_gel, closing_mm = FruitOnGel(one.fruit, one.pose, gel), recipe.damage.area[-1].closing_mm
+    steps, frames_s = round(closing_mm / recipe.steps.step_mm), recipe.imaging.frames_per_step * FRAME_S
+
+    def area_mm2(pause_s: float) -> float:
+        held_s = closing_mm / recipe.gripper.speed_mm_s + steps * (pause_s + frames_s)
+        return on_gel.pressed(Squeeze(one.fruit, gel, held_s).at(closing_mm)).true_area_mm2
+
+    return area_mm2(recipe.imaging.settle_s) / area_mm2(LONGER_PAUSE_S)
+
+
+def pause_table(ratios: Sequence[tuple[Task, float]]) -> list[str]:
+    """What a shorter pause does to the area, by kind."""
+    names = ("fruit", "pause, s", "fruit pressed", "area over that after 0.2 s: median", "furthest")
+    lines = [f"| {' | '.join(names)} |", "|---" * len(names) + "|"]
+    for kind in KINDS:
+        of_kind = [ratio for task, ratio in ratios if task.kind == kind]
+        furthest = max(of_kind, key=lambda ratio: abs(ratio - 1))
+        pause_s = find_recipe(kind).imaging.settle_s
+        lines.append(f"| {kind} | {pause_s:g} | {len(of_kind)} | {np.median(of_kind):.4f} | {furthest:.4f} |")
+    return lines
+
+
 def area_at(closing_mm: float, points: list[tuple[float, Contact]]) -> float:
     """The area at a closing, px, interpolated."""
     ordered = sorted(points, key=lambda each: each[0])
     return float(np.interp(closing_mm, [each[0] for each in ordered], [each[1].area_px for each in ordered]))
 
 
-def both(task: Task) -> tuple[list[Pair], Borne | None]:
-    """Compare areas and forces of one fruit."""
-    return compare(task), bear(task)
+def compared(task: Task) -> tuple[Task, list[Pair], Borne | None, float]:
+    """Compare areas, forces and pauses of one fruit."""
+    return task, compare(task), bear(task), paused(task)
 
 
 def area_table(pairs: Sequence[Pair]) -> list[str]:
@@ -297,15 +295,18 @@ def main() -> None:
     tasks = [Task(kind, group, "tuning", number) for kind in KINDS for group in GROUPS for number in range(asked.count)]
     pairs: list[Pair] = []
     borne: list[Borne] = []
-    for done, (found, force) in enumerate(on_this_machine(both, tasks, asked.processes), 1):
+    ratios: list[tuple[Task, float]] = []
+    for done, (task, found, force, ratio) in enumerate(on_this_machine(compared, tasks, asked.processes), 1):
         pairs += found
         borne += [] if force is None else [force]
+        ratios.append((task, ratio))
         print(f"\r{done} of {len(tasks)}", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
-    areas, forces = area_table(pairs), force_table(borne)
-    print("\n".join([*areas, "", *forces]))
+    areas, forces, pauses = area_table(pairs), force_table(borne), pause_table(ratios)
+    print("\n".join([*areas, "", *forces, "", *pauses]))
     write(AREAS, {"measured": areas})
     write(FORCES, {"forces": forces})
+    write(PAUSES, {"pauses": pauses})
 
 
 if __name__ == "__main__":

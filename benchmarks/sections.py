@@ -5,6 +5,26 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 
+def with_rows(document: Path, name: str, lines: Sequence[str], keys: int) -> list[str]:
+    """Return a document's table with some of its rows made again.
+
+    Args:
+        document: as `write` has it.
+        name: of the section.
+        lines: a table with the same columns; its rows take the place of those with the same first cells.
+        keys: how many cells say which row it is.
+
+    Raises:
+        SystemExit: the document does not have the section exactly once, or its columns are others.
+    """
+    found = re.findall(rf"<!-- {name} -->\n(.*?)<!-- /{name} -->", document.read_text(encoding="utf-8"), re.DOTALL)
+    if len(found) != 1 or found[0].splitlines()[:2] != lines[:2]:
+        raise SystemExit(f"{document}: expected one section {name} with the columns {lines[0]}: make all of its rows")
+    made = {tuple(line.split("|")[1 : 1 + keys]): line for line in lines}
+    kept = [made.pop(tuple(line.split("|")[1 : 1 + keys]), line) for line in found[0].splitlines()]
+    return [*kept, *made.values()]
+
+
 def write(document: Path, sections: Mapping[str, Sequence[str]]) -> None:
     """Put tables between their marks in a document.
 

@@ -5,6 +5,7 @@ The functions say what the service's cycle does with measured steps; here the st
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 from station.inspection.centring import Way, too_far
@@ -21,6 +22,7 @@ from station.vocabulary import Flag, OutcomeName, Reason
 
 from .presses import Closing, Pressed, Step
 from .specimens import CALIBRATION_SD, Specimen, Task, draw
+from .sweep import FRAME_S
 
 _ARM_MM = 0.05
 """The UR10e's repeatability by its data sheet."""
@@ -63,6 +65,8 @@ class Inspected:
     """With the one that only found the first contact off the middle."""
     steps: int
     """Width steps after the onset, of all closings."""
+    steps_s: float
+    """What they took."""
     most_force_n: float
 
 
@@ -87,7 +91,7 @@ def inspect(task: Task, recipe: Recipe, practice: Practice, source: Source) -> I
         Unmeasured: a closing is not measured yet.
     """
     specimen, recipe = draw(task), sized_by(practice, recipe)
-    shift_mm, closings, steps, forces = (0.0, 0.0), 0, 0, [0.0]
+    shift_mm, closings, steps, steps_s, forces = (0.0, 0.0), 0, 0, 0.0, [0.0]
     presses: list[Press] = []
 
     def close() -> Pressed:
@@ -114,11 +118,12 @@ def inspect(task: Task, recipe: Recipe, practice: Practice, source: Source) -> I
         press, used = as_stopped(pressed, specimen, recipe, practice, presses)
         presses.append(press)
         steps += max(0, used - 1)
+        steps_s += seconds(pressed.steps[:used], recipe)
         forces += [step.force_n for step in pressed.steps[:used]]
         verdict = judge(together(presses), recipe)
         if len(presses) >= most_presses or not needs_second_press(verdict):
             break
-    return Inspected(task, verdict.outcome, verdict.reasons, closings, steps, max(forces))
+    return Inspected(task, verdict.outcome, verdict.reasons, closings, steps, steps_s, max(forces))
 
 
 def move_mm(step: Step, recipe: Recipe, shift_mm: tuple[float, float]) -> tuple[float, float] | None:
@@ -165,11 +170,33 @@ def as_stopped(
         resolution_mm=GripperCalibration().mm_per_count,
         scale_uncertainty=scale_uncertainty,
     )
+    ended_on_the_way = False
     for step in pressed.steps:
         press = replace(press, points=(*press.points, _measured(step, mm_per_px)))
-        if ends_steps(together([*earlier, press]), recipe):
+        ends = ends_steps(together([*earlier, press]), recipe)
+        # The fingers run on for about a frame: the next one is where they come to rest, and has to say so too.
+        if ends and (ended_on_the_way or not step.on_the_way):
             break
+        ended_on_the_way = ends
     return press, len(press.points)
+
+
+def seconds(steps: Sequence[Step], recipe: Recipe) -> float:
+    """How long the steps after the onset take: motion, settling and frames.
+
+    Args:
+        steps: of one closing, the onset's first; may be none.
+        recipe: its recipe.
+    """
+    spent_s = 0.0
+    for before, step in pairwise(steps):
+        spent_s += (step.closing_mm - before.closing_mm) / recipe.gripper.speed_mm_s
+        if not step.on_the_way:
+            # Where the jaws stop after closing without a stop, nothing settles.
+            spent_s += recipe.imaging.frames_per_step * FRAME_S + (
+                0.0 if before.on_the_way else recipe.imaging.settle_s
+            )
+    return spent_s
 
 
 def sized_by(practice: Practice, recipe: Recipe) -> Recipe:

@@ -6,13 +6,16 @@ import sys
 import time
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import cv2
 
 import station
+from station.press.stop import steps_to_decide
 from station.settings.recipe import find_recipe
+from station.settings.recipe_model import Recipe
 from station.studies.gauge_grip import FruitRig, Grip
 from station.studies.workers import on_this_machine
 from station.twin.gel import SENSOR_SHAPE, Gel
@@ -20,6 +23,7 @@ from station.twin.squeeze import Squeeze
 from station.vision.contact import Contact
 
 from .specimens import SOUND, Task, draw
+from .sweep import close_on_the_way
 
 _DEEPEST_MM = 5.0
 """Two steps beyond the last threshold, where every fruit is decided."""
@@ -61,6 +65,8 @@ class Step(NamedTuple):
     """From the field's middle to the contact's, x to the right and y down; None without a contact."""
     force_n: float
     """The true one, before the flesh creeps."""
+    on_the_way: bool = False
+    """Measured while the jaws closed on."""
 
 
 class Pressed(NamedTuple):
@@ -72,17 +78,20 @@ class Pressed(NamedTuple):
     steps: tuple[Step, ...]
 
 
-def press(closing: Closing) -> tuple[Closing, Pressed]:
+def press(closing: Closing, recipes: Path | None = None) -> tuple[Closing, Pressed]:
     """Image and measure one closing.
 
     Args:
         closing: which.
+        recipes: the recipes' folder; None for the shipped ones.
     """
     cv2.setNumThreads(1)
-    one, recipe = draw(closing.task), find_recipe(closing.task.kind)
+    one, recipe = draw(closing.task), find_recipe(closing.task.kind, recipes)
     x_mm, y_mm = closing.shift_mm
     pose = replace(one.pose, x_px=one.pose.x_px + x_mm / one.mm_per_px, y_px=one.pose.y_px + y_mm / one.mm_per_px)
-    grip = Grip(recipe, FruitRig(one.fruit, pose, one.unit, one.noise_seed + closing.number, one.mm_per_px))
+    noise_seed = one.noise_seed + closing.number
+    rig = FruitRig(one.fruit, pose, one.unit, noise_seed, one.mm_per_px)
+    grip = Grip(recipe, rig)
     onset = grip.approach(one.phase)
     if onset is None:
         return closing, Pressed(None, 0.0, ())
@@ -92,9 +101,7 @@ def press(closing: Closing) -> tuple[Closing, Pressed]:
     deepest_mm = _EARLY_STOP_MM if pressed_on else _DEEPEST_MM
     steps: list[Step] = []
 
-    def goes_on(closing_mm: float, contact: Contact) -> bool:
-        if closing_mm > deepest_mm:
-            return False
+    def seen(closing_mm: float, contact: Contact, *, on_the_way: bool) -> None:
         centre = contact.centroid_px
         steps.append(
             Step(
@@ -104,11 +111,23 @@ def press(closing: Closing) -> tuple[Closing, Pressed]:
                 tuple(sorted(flag.value for flag in contact.flags)),
                 None if centre is None else (centre[0] - middle_x, centre[1] - middle_y),
                 squeeze.at(one.fruit.width_mm - onset.width_mm + closing_mm).force_n,
+                on_the_way,
             )
         )
+
+    def passing(closing_mm: float, contact: Contact) -> None:
+        seen(closing_mm, contact, on_the_way=True)
+
+    def goes_on(closing_mm: float, contact: Contact) -> bool:
+        if closing_mm > deepest_mm:
+            return False
+        seen(closing_mm, contact, on_the_way=False)
         return True
 
-    grip.close(onset, goes_on)
+    if recipe.steps.measured == "while_closing":
+        close_on_the_way(grip, rig, recipe, onset, noise_seed, passing, goes_on)
+    else:
+        grip.close(onset, goes_on)
     return closing, Pressed(onset.width_mm + one.zero_mm, onset.uncertainty_mm, tuple(steps))
 
 
@@ -118,10 +137,12 @@ class PressCache:
     Args:
         folder: where; made when needed.
         processes: that image at the same time.
+        recipes: the recipes' folder; None for the shipped ones.
     """
 
-    def __init__(self, folder: Path, processes: int) -> None:
-        self._folder, self._processes = folder, processes
+    def __init__(self, folder: Path, processes: int, recipes: Path | None = None) -> None:
+        self._folder, self._processes, self._recipes = folder, processes, recipes
+        self._hashes: dict[str, str] = {}
         self._known: dict[Closing, Pressed] = {}
         self._read: set[Path] = set()
 
@@ -145,8 +166,9 @@ class PressCache:
             wanted: which; those that are kept already are not made again.
         """
         missing = [closing for closing in dict.fromkeys(wanted) if self.get(closing) is None]
+        work = partial(press, recipes=self._recipes)
         began = kept = time.monotonic()
-        for done, (closing, pressed) in enumerate(on_this_machine(press, missing, self._processes), 1):
+        for done, (closing, pressed) in enumerate(on_this_machine(work, missing, self._processes), 1):
             self._known[closing] = pressed
             now = time.monotonic()
             if done == len(missing) or now - kept > _KEEP_EVERY_S:
@@ -167,21 +189,24 @@ class PressCache:
             beside.replace(place)
 
     def _place(self, task: Task) -> Path:
-        return self._folder / _made_by(task.kind) / f"{task.kind}-{task.group}-{task.seeds}.pickle"
+        if task.kind not in self._hashes:
+            self._hashes[task.kind] = made_by(find_recipe(task.kind, self._recipes))
+        return self._folder / self._hashes[task.kind] / f"{task.kind}-{task.group}-{task.seeds}.pickle"
 
 
-def _made_by(kind: str) -> str:
-    """A hash over the code and the recipe's part that decide what is measured."""
-    if kind not in _hashes:
-        root, recipe = Path(station.__file__).parent, find_recipe(kind)
-        digest = hashlib.sha256(Path(__file__).with_name("specimens.py").read_bytes())
-        digest.update(f"{recipe.steps.step_mm}{recipe.segmentation!r}{recipe.imaging!r}".encode())
-        for name in _DECIDED_BY:
-            place = root / name
-            for file in [place] if place.is_file() else sorted(place.rglob("*.[pn][yp]*")):
-                digest.update(file.read_bytes())
-        _hashes[kind] = digest.hexdigest()[:12]
-    return _hashes[kind]
+def made_by(recipe: Recipe) -> str:
+    """Return a hash over the code and the recipe's part that decide what is measured.
 
-
-_hashes: dict[str, str] = {}
+    Args:
+        recipe: by which it is.
+    """
+    root = Path(station.__file__).parent
+    digest = hashlib.sha256(Path(__file__).with_name("specimens.py").read_bytes())
+    digest.update(Path(__file__).with_name("sweep.py").read_bytes())
+    way = f"{recipe.steps.measured}{recipe.steps.step_mm}{recipe.gripper!r}{steps_to_decide(recipe)}"
+    digest.update(f"{way}{recipe.segmentation!r}{recipe.imaging!r}".encode())
+    for name in _DECIDED_BY:
+        place = root / name
+        for file in [place] if place.is_file() else sorted(place.rglob("*.[pn][yp]*")):
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]

@@ -5,7 +5,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import sqrt
 from statistics import median
 
-from station.settings.recipe_model import Recipe
 from station.twin.damage import Severity
 
 from .cycle import Inspected, Practice
@@ -22,7 +21,6 @@ PRACTICES = {
 }
 """What of the station is used, in the order of the table."""
 
-_FRAMES_PER_S = 30.0
 _95_PERCENT = 1.959964
 """Standard deviations of a normal distribution on either side of its mean."""
 
@@ -118,13 +116,12 @@ def diverted_why(inspected: Iterable[Inspected]) -> list[str]:
     return lines
 
 
-def spared(before: Iterable[Inspected], after: Iterable[Inspected], recipes: Mapping[str, Recipe]) -> list[str]:
+def spared(before: Iterable[Inspected], after: Iterable[Inspected]) -> list[str]:
     """Most force, steps and their seconds on sound fruit, pressed to the early stop and until decided.
 
     Args:
         before: as placed, to the early stop.
         after: as placed, until decided.
-        recipes: by the fruit's kind.
     """
     lines = header("fruit", "pressed", "most force, N", "median, N", "steps a fruit", "their seconds")
     ways = (("to the early stop", _grouped(before)), ("until decided", _grouped(after)))
@@ -133,7 +130,7 @@ def spared(before: Iterable[Inspected], after: Iterable[Inspected], recipes: Map
             if sound := groups.get((kind, SOUND), []):
                 forces = [one.most_force_n for one in sound]
                 steps = sum(one.steps for one in sound) / len(sound)
-                seconds = steps * _step_s(recipes[kind])
+                seconds = sum(one.steps_s for one in sound) / len(sound)
                 cells = f"{max(forces):.2f}", f"{median(forces):.2f}", f"{steps:.2f}", f"{seconds:.2f}"
                 lines.append(row(kind, name, *cells))
     return lines
@@ -148,13 +145,6 @@ def exchange(limits: str, inspected: Iterable[Inspected]) -> str:
     """
     groups = {group: fruit for (_, group), fruit in _grouped(inspected).items()}
     return row(limits, *(share(groups.get(group, [])) for group in (SOUND, Severity.MILD)))
-
-
-def _step_s(recipe: Recipe) -> float:
-    """Motion, settling and frames of one width step."""
-    imaging = recipe.imaging
-    motion_s = recipe.steps.step_mm / recipe.gripper.speed_mm_s
-    return motion_s + imaging.settle_s + imaging.frames_per_step / _FRAMES_PER_S
 
 
 def _grouped(inspected: Iterable[Inspected]) -> dict[tuple[str, str], list[Inspected]]:

@@ -1,6 +1,7 @@
 """The sorting run: what it draws, presses, decides closing by closing, keeps and counts."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,15 +15,18 @@ from benchmarks.sorting.cycle import (
     as_stopped,
     inspect,
     move_mm,
+    seconds,
     sized_by,
 )
 from benchmarks.sorting.presses import Closing, PressCache, Pressed, Step
 from benchmarks.sorting.specimens import KINDS, ON_UNITS, UNITS, Task, draw
+from station.settings.gripper import GripperCalibration
 from station.settings.recipe import find_recipe
 from station.twin.fruit import Kind
 from station.vision.scale import TYPICAL_MM_PER_PX
 from station.vocabulary import Reason
 
+ROOT = Path(__file__).resolve().parents[2]
 BLUEBERRY = Task(Kind.BLUEBERRY, "sound", "tuning", 0)
 CLOSINGS_MM = (0.0, 1.12, 1.87, 3.0, 4.12)
 SOUND_MM2 = (3.0, 19.0, 27.0, 37.0, 47.0)
@@ -88,6 +92,23 @@ class TestSpecimens:
 
 
 class TestPressing:
+    def test_a_fruit_that_is_measured_while_the_jaws_close_has_images_on_the_way_and_steps_after_it(
+        self, root, tmp_path
+    ):
+        blueberry = (ROOT / "recipes" / "blueberry.yaml").read_text()
+        own = blueberry.replace("\nsteps:", "\nsteps:\n  measured: while_closing")
+        (tmp_path / "blueberry.yaml").write_text(own)
+        closing = Closing(BLUEBERRY, 1, (0.0, 0.0))
+        _, found = presses.press(closing, tmp_path)
+        way = [step.closing_mm for step in found.steps if step.on_the_way]
+        count_mm = GripperCalibration().mm_per_count
+        assert [step.closing_mm for step in found.steps if not step.on_the_way] == pytest.approx(
+            [0.0, *(round(steps / count_mm) * count_mm for steps in (3, 4, 5))]
+        )
+        assert all(0 < closing_mm < 3 for closing_mm in way)
+        assert np.diff(way).mean() == pytest.approx(find_recipe("blueberry").gripper.speed_mm_s / 30, abs=0.2)
+        assert not any(step.on_the_way for step in presses.press(closing)[1].steps)
+
     def test_the_arm_brings_the_contact_to_the_middle(self, recipe):
         """A closing off the middle, its move, and the next closing: nearer than a move is made for."""
         task = next(
@@ -136,6 +157,24 @@ class TestDeciding:
         assert (twice.outcome, twice.reasons, twice.closings) == ("NO_RESULT", (Reason.LOW_CONFIDENCE,), 2)
         assert inspect(BLUEBERRY, recipe, Practice(), Presses(weak, weak)).outcome == "PASS", "both together"
 
+    def test_the_image_where_the_fingers_come_to_rest_is_taken_before_one_on_the_way_ends_the_closing(self, recipe):
+        def points(areas_mm2, on_the_way):
+            steps = pressed(areas_mm2).steps
+            steps = (*(step._replace(on_the_way=True) for step in steps[:on_the_way]), *steps[on_the_way:])
+            return as_stopped(Pressed(15.9, 0.1, steps), draw(BLUEBERRY), recipe, Practice(), ())[1]
+
+        too_large = (*SOUND_MM2[:2], 60.0, 62.0, 64.0)
+        assert [points(too_large, number) for number in (0, 2, 3, 4)] == [3, 3, 4, 4]
+
+    def test_steps_take_their_motion_and_those_at_rest_their_frames_and_the_pause(self, recipe):
+        steps = pressed().steps
+        way_s = steps[-1].closing_mm / recipe.gripper.speed_mm_s
+        frames_s = recipe.imaging.frames_per_step / 30
+        assert seconds((), recipe) == seconds(steps[:1], recipe) == 0.0
+        assert seconds(steps, recipe) == pytest.approx(way_s + 4 * (frames_s + recipe.imaging.settle_s))
+        on_the_way = [steps[0], *(step._replace(on_the_way=True) for step in steps[1:3]), *steps[3:]]
+        assert seconds(on_the_way, recipe) == pytest.approx(way_s + 2 * frames_s + recipe.imaging.settle_s)
+
     def test_a_damaged_fruit_is_not(self, recipe):
         presses = Presses(pressed((9.0, 40.0, 60.0, 80.0, 100.0)))
         assert inspect(BLUEBERRY, recipe, Practice(), presses).outcome == "FAIL"
@@ -176,7 +215,8 @@ class TestCache:
     def test_closings_are_measured_once_and_kept(self, tmp_path, monkeypatch, capsys):
         made = []
 
-        def press(closing: Closing) -> tuple[Closing, Pressed]:
+        def press(closing: Closing, recipes: Path | None) -> tuple[Closing, Pressed]:
+            assert recipes is None
             made.append(closing)
             return closing, pressed()
 
@@ -188,7 +228,11 @@ class TestCache:
         assert made == wanted
         assert again.get(wanted[2]) == pressed()
         assert "3 of 3" in capsys.readouterr().err
-        monkeypatch.setattr(presses, "_hashes", {Kind.BLUEBERRY: "other code"})
+        blueberry = (ROOT / "recipes" / "blueberry.yaml").read_text()
+        (tmp_path / "own").mkdir()
+        (tmp_path / "own" / "blueberry.yaml").write_text(blueberry.replace("frames_per_step: 3", "frames_per_step: 4"))
+        assert PressCache(tmp_path, 1, tmp_path / "own").get(wanted[0]) is None
+        monkeypatch.setattr(presses, "made_by", lambda _recipe: "other code")
         assert PressCache(tmp_path, 1).get(wanted[0]) is None
 
 
@@ -199,7 +243,7 @@ class TestTables:
 
     def test_both_errors_are_counted(self):
         def one(group, outcome):
-            return Inspected(BLUEBERRY._replace(group=group), outcome, (), 1, 3, 1.0)
+            return Inspected(BLUEBERRY._replace(group=group), outcome, (), 1, 3, 1.0, 1.0)
 
         inspected = [one("sound", "PASS"), one("sound", "NO_RESULT"), one("severe", "FAIL"), one("mild", "PASS")]
         row = tables.errors(inspected)[2]
