@@ -11,6 +11,7 @@ import argparse
 import asyncio
 import contextlib
 import os
+import re
 import shutil
 import statistics
 import subprocess
@@ -46,7 +47,7 @@ from station.commands.simulated_unit import calibrate_simulated_unit
 from station.devices.arm.ur import UrArm
 from station.devices.camera.open import camera_from
 from station.devices.gripper.robotiq import make_gripper
-from station.press.stop import MOST_UNSEEN_MM
+from station.press.stop import MOST_UNSEEN_MM, steps_to_decide
 from station.records.model import FullRecord
 from station.records.records import Records
 from station.runtime.devices.rig import FINEST_STEP_MM, Cell, DeviceRig, at_once
@@ -62,7 +63,7 @@ CHART = ROOT / "docs" / "images" / "cycle-time.svg"
 HOST = "127.0.0.11"
 CONSOLE = 49311
 FRUIT = ("strawberry", "raspberry", "blueberry")
-SEEDS = range(1, 10)
+SEEDS = range(1, 16)
 """Of each kind's fruit. Several, since the steps that one needs depend on it; odd, so that one is the median."""
 IN_A_ROW = 8
 PAGES_WITH_PACE = ("README.md", "docs/sizing.md", "docs/plc/index.md")
@@ -103,7 +104,7 @@ anywhere: [a mixed line](triggers.md). Unverified on hardware.
 
 {table}
 
-*While closing*: with recipes that measure while the jaws close (`steps.measured: while_closing`), in the same run, as
+*Measured*: by the shipped recipe's `steps.measured`. *Otherwise*: the other way, in the same run, as
 is *before*, the station of an earlier revision, where one was given (`--before`). The force on the fruit by both ways:
 [decision 63](decisions/0063-measurement-while-the-jaws-close.md#force-on-the-fruit).
 
@@ -114,7 +115,8 @@ no reference examined, nothing measured, judged, recorded or published. Ours is 
 make of a busy machine's processors counts as ours.
 
 **What limits it**: closing at 20 mm/s, the slowest that the 2F-85 goes, from just wider than the widest fruit that
-the recipe expects; the pause of 0.2 s and three frames at 30 frames/s in each step; and the arm's way down.
+the recipe expects; the pause of 0.2 s and three frames at 30 frames/s in each step, where it is measured at rest; and
+the arm's way down.
 
 ## Overshoot
 
@@ -196,7 +198,7 @@ async def inspect(configuration: Configuration) -> dict[str, Pace]:
                     return
                 if time.monotonic() > deadline_s:
                     raise SystemExit(f"the station does not become ready: {state.why_not_ready}")
-                await asyncio.sleep(0.005)
+                await asyncio.sleep(0.001)
 
         async def one(kind: str, seed: int, number: int, *, at_rest: bool) -> Inspected:
             await ready(at_rest=at_rest)
@@ -284,8 +286,18 @@ async def bare(configuration: Configuration, cell: Cell, recipe: Recipe, record:
     await watch.time("onset", "camera", grip.frames(1))
     await watch.time("onset", "motion", grip.close_to(onset_mm))
     await watch.time("onset", "camera", grip.frames(imaging.frames_per_step))
-    for number in range(1, len(judged.curve)):
-        await watch.time("steps", "motion", grip.close_to(onset_mm - number * recipe.steps.step_mm))
+    step_mm, widths_mm = recipe.steps.step_mm, [point.width_mm for point in judged.curve]
+    number, following = 0, len(widths_mm) - 1
+    if recipe.steps.measured == "while_closing":
+        number = steps_to_decide(recipe)
+        target_mm = onset_mm - number * step_mm
+        # Images on the way cost the motion no time; what follows it are whole steps.
+        following = sum(width_mm < target_mm - step_mm / 2 for width_mm in widths_mm)
+        await watch.time("steps", "motion", grip.close_to(max(target_mm, widths_mm[-1])))
+        await watch.time("steps", "camera", grip.frames(imaging.frames_per_step))
+    for _ in range(following):
+        number += 1
+        await watch.time("steps", "motion", grip.close_to(onset_mm - number * step_mm))
         await watch.time("steps", "settling", asyncio.sleep(imaging.settle_s))
         await watch.time("steps", "camera", grip.frames(imaging.frames_per_step))
     await watch.time("release", "motion", cell.gripper.open(around_mm))
@@ -338,11 +350,19 @@ def medians(pace: Pace) -> tuple[float, float]:
     )
 
 
+WAYS = {"at_rest": "at rest", "while_closing": "while closing"}
+"""`steps.measured` in words."""
+
+
 def table(
-    results: Mapping[str, Pace], closing: Mapping[str, Pace], before: Mapping[str, Pace], spent: Spent
+    shipped: Mapping[str, Recipe],
+    results: Mapping[str, Pace],
+    other: Mapping[str, Pace],
+    before: Mapping[str, Pace],
+    spent: Spent,
 ) -> list[str]:
     """Medians over the fruit."""
-    rows, beside = [], {"while closing": closing, **({"before": before} if before else {})}
+    rows, beside = [], {"otherwise": other, **({"before": before} if before else {})}
     for kind in FRUIT:
         pace = results[kind]
         outcomes = ", ".join(f"{times} {name}" for name, times in Counter(each.outcome for each in pace.alone).items())
@@ -350,28 +370,37 @@ def table(
         outcome_s, next_s = medians(pace)
         floor_s = statistics.median(sum(floor.kinds_s.values()) for _, _, floor in spent[kind])
         ours_s = statistics.median(each.to_next_s - sum(floor.kinds_s.values()) for each, _, floor in spent[kind])
-        cells = [kind, outcomes, f"{twice}", f"{outcome_s:.2f}", f"{next_s:.2f}", f"{pace.a_minute:.1f}"]
-        for other in beside.values():
-            cells += [*(f"{seconds:.2f}" for seconds in medians(other[kind])), f"{other[kind].a_minute:.1f}"]
+        cells = [kind, WAYS[shipped[kind].steps.measured], outcomes, f"{twice}"]
+        cells += [f"{outcome_s:.2f}", f"{next_s:.2f}", f"{pace.a_minute:.1f}"]
+        for each in beside.values():
+            cells += [*(f"{seconds:.2f}" for seconds in medians(each[kind])), f"{each[kind].a_minute:.1f}"]
         rows.append(f"| {' | '.join(cells)} | {floor_s:.2f} | {ours_s:.2f} | {100 * ours_s / floor_s:.1f} % |")
-    names = ("fruit", "outcome", "closed on twice", "to outcome, s", "to next trigger, s", "fruit a minute")
-    others = [name for other in beside for name in (f"{other}: to outcome", "to next trigger", "fruit a minute")]
+    names = ("fruit", "measured", "outcome", "closed on twice", "to outcome, s", "to next trigger, s", "fruit a minute")
+    others = [name for each in beside for name in (f"{each}: to outcome", "to next trigger", "fruit a minute")]
     header = [
         f"| {' | '.join((*names, *others, 'floor, s', 'ours, s', '% of the floor'))} |",
-        "|---" * (9 + len(others)) + "|",
+        "|---" * (10 + len(others)) + "|",
     ]
     return [*header, *rows]
 
 
-def pace_table(results: Mapping[str, Pace], closing: Mapping[str, Pace]) -> list[str]:
+def pace_table(shipped: Mapping[str, Recipe], results: Mapping[str, Pace], other: Mapping[str, Pace]) -> list[str]:
     """What a line builder asks first."""
     rows = []
     for kind in FRUIT:
         outcome_s, next_s = medians(results[kind])
-        faster = f"{closing[kind].a_minute:.0f}"
-        rows.append(f"| {kind} | {results[kind].a_minute:.0f} | {outcome_s:.1f} | {next_s:.1f} | {faster} |")
-    names = ("fruit", "fruit a minute", "trigger to outcome, s", "to the next trigger, s", "measured while closing")
-    return [f"| {' | '.join(names)} |", "|---" * 5 + "|", *rows]
+        way, otherwise = shipped[kind].steps.measured, other_way(shipped[kind])
+        cells = (
+            kind,
+            WAYS[way],
+            f"{results[kind].a_minute:.0f}",
+            f"{outcome_s:.1f}",
+            f"{next_s:.1f}",
+            f"{other[kind].a_minute:.0f} {WAYS[otherwise]}",
+        )
+        rows.append(f"| {' | '.join(cells)} |")
+    names = ("fruit", "measured", "fruit a minute", "trigger to outcome, s", "to the next trigger, s", "otherwise")
+    return [f"| {' | '.join(names)} |", "|---" * 6 + "|", *rows]
 
 
 def phase_table(spent: Spent) -> list[str]:
@@ -425,19 +454,26 @@ def draw(spent: Spent) -> None:
         figure.savefig(CHART, metadata={"Date": None})
 
 
-def measured_while_closing(folder: str) -> Path:
-    """Put the shipped recipes into a folder, those that begin at the onset measured while the jaws close."""
-    place, onset = Path(folder) / "recipes", "\n  start: onset"
+def recipes_measured(folder: str, way: Mapping[str, str]) -> Path:
+    """Put the shipped recipes of fruit into a folder, each measured in another way."""
+    place = Path(folder) / "recipes"
     shutil.copytree(ROOT / "recipes", place)
-    for recipe in place.glob("*.yaml"):
-        recipe.write_text(recipe.read_text().replace(onset, f"\n  measured: while_closing{onset}"))
+    for kind, measured in way.items():
+        file = place / f"{kind}.yaml"
+        text = re.sub(r"\n  measured: .*", "", file.read_text())
+        file.write_text(text.replace("\nsteps:", f"\nsteps:\n  measured: {measured}", 1))
     return place
 
 
-def configured(folder: str, *, while_closing: bool = False) -> tuple[Path, Configuration]:
-    """A cell's configuration file, and what it says; with the shipped recipes, or those measured while closing."""
+def other_way(recipe: Recipe) -> str:
+    """How the recipe is not measured."""
+    return "at_rest" if recipe.steps.measured == "while_closing" else "while_closing"
+
+
+def configured(folder: str, way: Mapping[str, str] | None = None) -> tuple[Path, Configuration]:
+    """A cell's configuration file, and what it says; with the shipped recipes, or those measured in another way."""
     file = Path(folder) / "station.yaml"
-    own = f"recipes_folder: {measured_while_closing(folder)}\n" if while_closing else ""
+    own = f"recipes_folder: {recipes_measured(folder, way)}\n" if way else ""
     file.write_text(
         f"home: {folder}\narm: {{host: {HOST}}}\n"
         f"gripper: {{urcap: {{host: {HOST}}}, modbus_rtu: {{host: {HOST}}}}}\n"
@@ -449,10 +485,10 @@ def configured(folder: str, *, while_closing: bool = False) -> tuple[Path, Confi
     return file, configuration
 
 
-def inspected_while_closing() -> dict[str, Pace]:
-    """The same fruit by recipes that measure while the jaws close."""
+def inspected_otherwise(shipped: Mapping[str, Recipe]) -> dict[str, Pace]:
+    """The same fruit, each measured as its shipped recipe does not."""
     with tempfile.TemporaryDirectory() as folder:
-        file, configuration = configured(folder, while_closing=True)
+        file, configuration = configured(folder, {kind: other_way(shipped[kind]) for kind in FRUIT})
         with ended(start("twin", file, "--console", str(CONSOLE))), ended(start("service", file)):
             return asyncio.run(inspect(configuration))
 
@@ -480,7 +516,8 @@ def main() -> None:
     parser.add_argument("--before", metavar="REVISION", help="compare with the station of this revision")
     revision = parser.parse_args().before
     before = inspected_before(revision) if revision else {}
-    closing = inspected_while_closing()
+    shipped = load_recipes()
+    other = inspected_otherwise(shipped)
     with tempfile.TemporaryDirectory() as folder:
         file, configuration = configured(folder)
         with ended(start("twin", file, "--console", str(CONSOLE))):
@@ -493,7 +530,7 @@ def main() -> None:
         in_a_row=IN_A_ROW,
         load=os.getloadavg()[0],
         cores=os.cpu_count(),
-        table="\n".join(table(results, closing, before, spent)),
+        table="\n".join(table(shipped, results, other, before, spent)),
         overshoots="\n".join(overshoot_table(spent)),
         most_mm=MOST_UNSEEN_MM,
         phases="\n".join(phase_table(spent)),
@@ -501,7 +538,7 @@ def main() -> None:
     print(document)
     (ROOT / "docs" / "cycle-time.md").write_text(document)
     for page in PAGES_WITH_PACE:
-        write(ROOT / page, {"pace": pace_table(results, closing)})
+        write(ROOT / page, {"pace": pace_table(shipped, results, other)})
 
 
 if __name__ == "__main__":

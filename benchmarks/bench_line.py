@@ -12,7 +12,7 @@ import statistics
 import tempfile
 from pathlib import Path
 
-from bench_cycle import measured_while_closing
+from bench_cycle import recipes_measured
 from bench_triggers import CONFIGURATION, KINDS, Run, disagreements, inspect, reasons, table
 
 from plc_interface.plc_simulator.program import Decision
@@ -20,6 +20,7 @@ from station.commands.simulated_unit import calibrate_simulated_unit
 from station.settings.configuration import load_configuration
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "line-pace.md"
+WHILE_CLOSING: dict[str, str] = dict.fromkeys(KINDS, "while_closing")
 DAMAGED_SHARE = 0.1
 """An estimate, on the high side: damaged fruit are pressed twice more often, and so take longer."""
 
@@ -28,7 +29,7 @@ def at_pace(kind: str, a_minute: float, count: int) -> tuple[Run, list[str]]:
     """Run a line with one kind of fruit; and where the books differ."""
     with tempfile.TemporaryDirectory() as home:
         file = Path(home) / "station.yaml"
-        file.write_text(f"{CONFIGURATION}recipes_folder: {measured_while_closing(home)}\n", encoding="utf-8")
+        file.write_text(f"{CONFIGURATION}recipes_folder: {recipes_measured(home, WHILE_CLOSING)}\n", encoding="utf-8")
         os.environ |= {"STATION_HOME": home, "STATION_CONFIG": str(file)}
         site = load_configuration()
         calibrate_simulated_unit(site, "bench")
