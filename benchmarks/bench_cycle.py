@@ -115,8 +115,8 @@ no reference examined, nothing measured, judged, recorded or published. Ours is 
 make of a busy machine's processors counts as ours.
 
 **What limits it**: closing at 20 mm/s, the slowest that the 2F-85 goes, from just wider than the widest fruit that
-the recipe expects; the pause of 0.2 s and three frames at 30 frames/s in each step, where it is measured at rest; and
-the arm's way down.
+the recipe expects; the motion, a frame's pause and three frames at 30 frames/s of each step, where it is measured at
+rest; and the arm's way down.
 
 ## Overshoot
 

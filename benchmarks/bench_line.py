@@ -1,8 +1,8 @@
 """A line at a fixed pace: two hundred fruit of each kind arrive every few seconds, whatever the station does.
 
 Run with `./run bench line [--a-minute 18] [--count 200]`. The line simulator triggers the real station over Modbus
-against the twin, by recipes that measure while the jaws close. A fruit that the nest is not free for waits before it,
-and the next ones behind it. Writes `docs/line-pace.md`.
+against the twin, by the shipped recipes. A fruit that the nest is not free for waits before it, and the next ones
+behind it. Writes `docs/line-pace.md`.
 """
 
 import argparse
@@ -12,7 +12,6 @@ import statistics
 import tempfile
 from pathlib import Path
 
-from bench_cycle import recipes_measured
 from bench_triggers import CONFIGURATION, KINDS, Run, disagreements, inspect, reasons, table
 
 from plc_interface.plc_simulator.program import Decision
@@ -20,7 +19,6 @@ from station.commands.simulated_unit import calibrate_simulated_unit
 from station.settings.configuration import load_configuration
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "line-pace.md"
-WHILE_CLOSING: dict[str, str] = dict.fromkeys(KINDS, "while_closing")
 DAMAGED_SHARE = 0.1
 """An estimate, on the high side: damaged fruit are pressed twice more often, and so take longer."""
 
@@ -29,7 +27,7 @@ def at_pace(kind: str, a_minute: float, count: int) -> tuple[Run, list[str]]:
     """Run a line with one kind of fruit; and where the books differ."""
     with tempfile.TemporaryDirectory() as home:
         file = Path(home) / "station.yaml"
-        file.write_text(f"{CONFIGURATION}recipes_folder: {recipes_measured(home, WHILE_CLOSING)}\n", encoding="utf-8")
+        file.write_text(CONFIGURATION, encoding="utf-8")
         os.environ |= {"STATION_HOME": home, "STATION_CONFIG": str(file)}
         site = load_configuration()
         calibrate_simulated_unit(site, "bench")
@@ -81,9 +79,9 @@ def main() -> None:
     text = f"""# A line at {asked.a_minute:g} fruit a minute
 
 Written by `./run bench line`. Fruit arrive every {60 / asked.a_minute:.1f} s, {DAMAGED_SHARE:.0%} of them damaged,
-and are measured while the jaws close (`steps.measured: while_closing`). One that the nest is not free for waits before
-it: one that is centred or pressed twice takes longer than the pace, and others take less. *Books* are the PLC's
-readings, the records and the metrics. On the twin; unverified on hardware.
+and are inspected by the shipped recipes. One that the nest is not free for waits before it: one that is centred or
+pressed twice may take longer than the pace, and others take less. *Books* are the PLC's readings, the records and the
+metrics. On the twin; unverified on hardware.
 
 {pace_table}
 

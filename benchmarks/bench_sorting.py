@@ -85,6 +85,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=FRUIT, help="fruit of each kind and damage; a third with a patch")
     parser.add_argument("--kinds", nargs="+", type=Kind, choices=KINDS, default=KINDS)
     parser.add_argument("--seeds", nargs="+", choices=SEEDS, default=["judging"])
+    parser.add_argument("--tables", nargs="+", choices=KEYS, default=list(KEYS), help="make these again; else all")
     parser.add_argument("--recipes", type=Path, metavar="DIR", help="the folder of the recipes; else the shipped ones")
     parser.add_argument("--limits", nargs="+", metavar="MM2,…", help="compare these limits of the one kind in --kinds")
     parser.add_argument("--processes", type=int, default=2)
@@ -106,25 +107,27 @@ def main() -> None:
         two_groups = [task for task in tasks if task.group in {SOUND, Severity.MILD}]
         compare_limits(two_groups, recipes[kind], asked.limits, cache)
         return
-    all_of_it = decided(tasks, recipes, [Practice()], cache)[Practice()]
-    some = [task for task in tasks if task.number < OF_EACH_GROUP and task.group != Severity.PATCH]
-    compared = decided(some, recipes, tables.PRACTICES.values(), cache)
-    sound = [task for task in tasks if task.group == SOUND and task.number < PRESSED_ON]
-    pressed_on = {kind: without_stop(recipe) for kind, recipe in recipes.items()}
-    before, after = (decided(sound, by, [AS_PLACED], cache)[AS_PLACED] for by in (pressed_on, recipes))
-    sections = {
-        "errors": tables.errors(all_of_it),
-        "why": tables.diverted_why(all_of_it),
-        "worth": tables.worth({name: compared[practice] for name, practice in tables.PRACTICES.items()}),
-        "spared": tables.spared(before, after),
-    }
+    sections: dict[str, list[str]] = {}
+    if {"errors", "why"} & set(asked.tables):
+        all_of_it = decided(tasks, recipes, [Practice()], cache)[Practice()]
+        sections |= {"errors": tables.errors(all_of_it), "why": tables.diverted_why(all_of_it)}
+    if "worth" in asked.tables:
+        some = [task for task in tasks if task.number < OF_EACH_GROUP and task.group != Severity.PATCH]
+        compared = decided(some, recipes, tables.PRACTICES.values(), cache)
+        sections["worth"] = tables.worth({name: compared[practice] for name, practice in tables.PRACTICES.items()})
+    if "spared" in asked.tables:
+        sound = [task for task in tasks if task.group == SOUND and task.number < PRESSED_ON]
+        pressed_on = {kind: without_stop(recipe) for kind, recipe in recipes.items()}
+        before, after = (decided(sound, by, [AS_PLACED], cache)[AS_PLACED] for by in (pressed_on, recipes))
+        sections["spared"] = tables.spared(before, after)
     for lines in sections.values():
         print("\n".join(lines), end="\n\n")
     if asked.seeds == ["judging"] and asked.count == FRUIT and asked.recipes is None:
         of_kinds = {name: named_kinds(lines, asked.kinds) for name, lines in sections.items()}
         rows = {name: with_rows(DOCUMENT, name, lines, KEYS[name]) for name, lines in of_kinds.items()}
         write(DOCUMENT, rows)
-        write(README, {"errors": rows["errors"]})
+        if "errors" in rows:
+            write(README, {"errors": rows["errors"]})
 
 
 if __name__ == "__main__":
