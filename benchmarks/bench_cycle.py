@@ -47,7 +47,7 @@ from station.commands.simulated_unit import calibrate_simulated_unit
 from station.devices.arm.ur import UrArm
 from station.devices.camera.open import camera_from
 from station.devices.gripper.robotiq import make_gripper
-from station.press.stop import MOST_UNSEEN_MM, steps_to_decide
+from station.press.stop import MOST_UNSEEN_MM
 from station.records.model import FullRecord
 from station.records.records import Records
 from station.runtime.devices.rig import FINEST_STEP_MM, Cell, DeviceRig, at_once
@@ -262,7 +262,7 @@ Spent = dict[str, list[tuple[Inspected, dict[str, float], Stopwatch]]]
 
 
 async def bare(configuration: Configuration, cell: Cell, recipe: Recipe, record: FullRecord) -> Stopwatch:
-    """The same moves, waits and frames as in an inspection, and nothing else."""
+    """The same moves, waits and frames as in an inspection measured at rest, and nothing else."""
     grip, watch, imaging = DeviceRig(cell, recipe), Stopwatch(), recipe.imaging
     judged = record.judged
     if judged is None or not judged.curve:
@@ -286,18 +286,8 @@ async def bare(configuration: Configuration, cell: Cell, recipe: Recipe, record:
     await watch.time("onset", "camera", grip.frames(1))
     await watch.time("onset", "motion", grip.close_to(onset_mm))
     await watch.time("onset", "camera", grip.frames(imaging.frames_per_step))
-    step_mm, widths_mm = recipe.steps.step_mm, [point.width_mm for point in judged.curve]
-    number, following = 0, len(widths_mm) - 1
-    if recipe.steps.measured == "while_closing":
-        number = steps_to_decide(recipe)
-        target_mm = onset_mm - number * step_mm
-        # Images on the way cost the motion no time; what follows it are whole steps.
-        following = sum(width_mm < target_mm - step_mm / 2 for width_mm in widths_mm)
-        await watch.time("steps", "motion", grip.close_to(max(target_mm, widths_mm[-1])))
-        await watch.time("steps", "camera", grip.frames(imaging.frames_per_step))
-    for _ in range(following):
-        number += 1
-        await watch.time("steps", "motion", grip.close_to(onset_mm - number * step_mm))
+    for number in range(1, len(judged.curve)):
+        await watch.time("steps", "motion", grip.close_to(onset_mm - number * recipe.steps.step_mm))
         await watch.time("steps", "settling", asyncio.sleep(imaging.settle_s))
         await watch.time("steps", "camera", grip.frames(imaging.frames_per_step))
     await watch.time("release", "motion", cell.gripper.open(around_mm))

@@ -45,16 +45,17 @@ def test_every_state_that_waits_for_something_has_a_deadline_that_the_cycle_answ
 
 def test_the_strawberrys_deadline_covers_its_motions_and_no_hours():
     limits, once = deadlines(RECIPE, PACE), deadlines(changed(attempts=1, centre_from_mm=None), PACE)
-    steps_s = 3 * (1 / 20 + 0.2 + 3 / 30)
+    settle_s = RECIPE.imaging.settle_s
+    steps_s = 3 * (1 / 20 + settle_s + 3 / 30)
     assert 5 / 30 + PACE.arm_way_s + steps_s < once.longest_path_s < limits.longest_path_s < 15
     assert limits.longest_path_s < limits.inspection_s < 2 * limits.longest_path_s
     assert BeginReply(sequence=1, deadline_s=limits.inspection_s).refusal is None
-    assert limits.phases_s[State.SETTLING] == pytest.approx(1.0 + 3 * 0.2)
+    assert limits.phases_s[State.SETTLING] == pytest.approx(1.0 + 3 * settle_s)
 
 
 def test_a_recipe_that_takes_the_whole_curve_has_the_time_for_it():
     decided, whole = (deadlines(changed(stop_when_decided=stops), PACE).longest_path_s for stops in (True, False))
-    assert whole - decided > 2 * (RECIPE.steps.number - 3) * (1 / 20 + 0.2 + 3 / 30)
+    assert whole - decided > 2 * (RECIPE.steps.number - 3) * (1 / 20 + RECIPE.imaging.settle_s + 3 / 30)
 
 
 def test_a_step_that_is_measured_before_the_next_has_the_measurements_time_too():
@@ -64,7 +65,7 @@ def test_a_step_that_is_measured_before_the_next_has_the_measurements_time_too()
 
 def test_a_second_press_has_its_time_to_let_go_and_press_again():
     once, twice = (deadlines(changed(attempts=attempts), PACE).longest_path_s for attempts in (1, 2))
-    assert twice - once > 2 * FREED_BY_MM / 20 + 3 * (1 / 20 + 0.2 + 3 / 30)
+    assert twice - once > 2 * FREED_BY_MM / 20 + 3 * (1 / 20 + RECIPE.imaging.settle_s + 3 / 30)
 
 
 def test_centring_has_its_time_where_there_is_an_arm():

@@ -93,7 +93,7 @@ class TestSpecimens:
 
 class TestPressing:
     def test_a_fruit_that_is_measured_while_the_jaws_close_has_images_on_the_way_and_steps_after_it(
-        self, root, tmp_path
+        self, tmp_path
     ):
         blueberry = (ROOT / "recipes" / "blueberry.yaml").read_text()
         own = blueberry.replace("\nsteps:", "\nsteps:\n  measured: while_closing")
