@@ -1,10 +1,10 @@
 """Measuring while the jaws close, beside the stepped press, on fruit of the twin with its creep.
 
-Run with `./run bench sweep [--count N]`; writes the tables of `docs/decisions/0060-stepped-measurement-at-rest.md`,
-`0063-measurement-while-the-jaws-close.md` and `0085-pause-of-a-step.md`. The same fruit, unit, noise and onset: once
-stepped as by the recipe, once closed at the gripper's slowest speed with one frame every 1/30 s, each with the width at
-its capture, known to the jitter of a frame's time. Compared are the areas at the damage limits' closings, and the force
-on the fruit where each way ends; and the area after the shipped pause of a step with that after a longer one.
+Run with `./run bench sweep [--count N]`; writes the tables of `docs/decisions/0060-stepped-measurement-at-rest.md` and
+`docs/decisions/0063-measurement-while-the-jaws-close.md`. The same fruit, unit, noise and onset: once stepped as by the
+recipe, once closed at the gripper's slowest speed with one frame every 1/30 s, each with the width at its capture,
+known to the jitter of a frame's time. Compared are the areas at the damage limits' closings, and the force on the fruit
+where each way ends.
 """
 
 import argparse
@@ -30,7 +30,6 @@ from station.press.stop import ends_steps, steps_to_decide
 from station.settings.recipe import Recipe, find_recipe
 from station.studies.gauge_grip import FruitRig, Grip, Onset
 from station.studies.workers import on_this_machine
-from station.twin.contact import FruitOnGel
 from station.twin.gel import Gel
 from station.twin.squeeze import Squeeze
 from station.vision.contact import Contact
@@ -39,10 +38,7 @@ from station.vision.press import PressTracker
 DECISIONS = Path(__file__).resolve().parents[1] / "docs" / "decisions"
 AREAS = DECISIONS / "0060-stepped-measurement-at-rest.md"
 FORCES = DECISIONS / "0063-measurement-while-the-jaws-close.md"
-PAUSES = DECISIONS / "0085-pause-of-a-step.md"
 GROUPS = ("sound", "severe")
-LONGER_PAUSE_S = 0.2
-"""The shipped recipes' until 2026-11-25."""
 RUNS_ON_MM = 0.7
 """So far the fingers run on after the frame that stops them: the most that was measured, docs/cycle-time.md."""
 
@@ -221,48 +217,15 @@ def force_table(borne: Sequence[Borne]) -> list[str]:
     return lines
 
 
-def paused(task: Task) -> float:
-    """Compare the true area at the last limit with that after longer pauses.
-
-    Args:
-        task: which fruit.
-
-    Returns:
-        The area with the shipped pause over the one with `LONGER_PAUSE_S`.
-    """
-    one, recipe = draw(task), find_recipe(task.kind)
-    gel = Gel(mm_per_px=one.mm_per_px)
-    on_gel, closing_mm = FruitOnGel(one.fruit, one.pose, gel), recipe.damage.area[-1].closing_mm
-    steps, frames_s = round(closing_mm / recipe.steps.step_mm), recipe.imaging.frames_per_step * FRAME_S
-
-    def area_mm2(pause_s: float) -> float:
-        held_s = closing_mm / recipe.gripper.speed_mm_s + steps * (pause_s + frames_s)
-        return on_gel.pressed(Squeeze(one.fruit, gel, held_s).at(closing_mm)).true_area_mm2
-
-    return area_mm2(recipe.imaging.settle_s) / area_mm2(LONGER_PAUSE_S)
-
-
-def pause_table(ratios: Sequence[tuple[Task, float]]) -> list[str]:
-    """What a shorter pause does to the area, by kind."""
-    names = ("fruit", "pause, s", "fruit pressed", "area over that after 0.2 s: median", "furthest")
-    lines = [f"| {' | '.join(names)} |", "|---" * len(names) + "|"]
-    for kind in KINDS:
-        of_kind = [ratio for task, ratio in ratios if task.kind == kind]
-        furthest = max(of_kind, key=lambda ratio: abs(ratio - 1))
-        pause_s = find_recipe(kind).imaging.settle_s
-        lines.append(f"| {kind} | {pause_s:g} | {len(of_kind)} | {np.median(of_kind):.4f} | {furthest:.4f} |")
-    return lines
-
-
 def area_at(closing_mm: float, points: list[tuple[float, Contact]]) -> float:
     """The area at a closing, px, interpolated."""
     ordered = sorted(points, key=lambda each: each[0])
     return float(np.interp(closing_mm, [each[0] for each in ordered], [each[1].area_px for each in ordered]))
 
 
-def compared(task: Task) -> tuple[Task, list[Pair], Borne | None, float]:
-    """Compare areas, forces and pauses of one fruit."""
-    return task, compare(task), bear(task), paused(task)
+def both(task: Task) -> tuple[list[Pair], Borne | None]:
+    """Compare areas and forces of one fruit."""
+    return compare(task), bear(task)
 
 
 def area_table(pairs: Sequence[Pair]) -> list[str]:
@@ -295,18 +258,15 @@ def main() -> None:
     tasks = [Task(kind, group, "tuning", number) for kind in KINDS for group in GROUPS for number in range(asked.count)]
     pairs: list[Pair] = []
     borne: list[Borne] = []
-    ratios: list[tuple[Task, float]] = []
-    for done, (task, found, force, ratio) in enumerate(on_this_machine(compared, tasks, asked.processes), 1):
+    for done, (found, force) in enumerate(on_this_machine(both, tasks, asked.processes), 1):
         pairs += found
         borne += [] if force is None else [force]
-        ratios.append((task, ratio))
         print(f"\r{done} of {len(tasks)}", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
-    areas, forces, pauses = area_table(pairs), force_table(borne), pause_table(ratios)
-    print("\n".join([*areas, "", *forces, "", *pauses]))
+    areas, forces = area_table(pairs), force_table(borne)
+    print("\n".join([*areas, "", *forces]))
     write(AREAS, {"measured": areas})
     write(FORCES, {"forces": forces})
-    write(PAUSES, {"pauses": pauses})
 
 
 if __name__ == "__main__":

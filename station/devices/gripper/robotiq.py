@@ -204,7 +204,7 @@ class Robotiq2F85:
         return status, at_s
 
     async def _arrival(self, count: int, deadline_s: float, stops: int, renewed_at: int | None) -> tuple[Status, float]:
-        """Return the status once two consecutive readings found the fingers at rest, and at the same place.
+        """Return the status once the fingers rest at the place itself, or by two consecutive readings at the same one.
 
         Args:
             renewed_at: so many counts before the place it is also returned while they move; None for a last place.
@@ -214,7 +214,7 @@ class Robotiq2F85:
             status, at_s = await self._ready()
             self._go_on_unless_stopped(stops)
             at_rest = self._at_rest(status, count)
-            if status.echo == count and at_rest and status.position == position:
+            if status.echo == count and at_rest and status.position in {position, count}:
                 return status, at_s
             if not at_rest and renewed_at is not None and count - status.position <= renewed_at:
                 return status, at_s
