@@ -61,7 +61,9 @@ class PressMeasurement:
         known = self._known.get(id(image))
         contact = self._method.measure(image, firm_only=True) if known is None else known[1]
         # The frame that shows the contact first is one of those that confirm it.
-        self._known = {id(image): (image, contact)}
+        self._known = {key: (one, found) for key, (one, found) in self._known.items() if found.is_firm}
+        if contact.is_firm:
+            self._known[id(image)] = image, contact
         return MeasuredStep(step, image, contact)
 
     def measure(self, step: Step) -> MeasuredStep:

@@ -201,32 +201,27 @@ class _Search:
         Args:
             from_mm: where the search begins.
             at: the fingers where they are there already.
-            seen_clear: nothing touched there before, so that the fingers close on while it is measured again. Where
-                something does touch, they are up to a finest step further than that step then.
+            seen_clear: nothing touched there before. It is measured again only where the finest step after it shows a
+                contact; where it does so too, the fingers are that step further than the one that is returned.
         """
         width_mm, before = from_mm, None
+        unmeasured: Step | None = None
         while width_mm >= self._lowest_mm:
             move = at or await self._rig.close_to(width_mm)
-            step, next_mm = Step(-1, move, await self._rig.frames(1)), width_mm - self._rig.finest_step_mm
+            step, at = Step(-1, move, await self._rig.frames(1)), None
+            next_mm = width_mm - self._rig.finest_step_mm
             if seen_clear and not move.held and next_mm >= self._lowest_mm:
-                seen, at = await self._measured_closing_on(step, next_mm)
-            else:
-                seen, at = await self._measure(step), None
+                seen_clear, before, unmeasured, width_mm = False, step, step, next_mm
+                continue
+            seen = await self._measure(step)
             if stop.touches(seen):
+                if unmeasured is not None and stop.touches(wider := await self._measure(unmeasured)):
+                    return width_mm + self._rig.finest_step_mm, None, wider.step
                 return width_mm, before, seen.step
             if seen.step.move.held:
                 raise stop.nothing_touched(self._recipe, seen.step.move)
-            width_mm, before, seen_clear = next_mm, seen.step, False
+            width_mm, before, unmeasured = next_mm, seen.step, None
         raise stop.nothing_touched(self._recipe)
-
-    async def _measured_closing_on(self, step: Step, width_mm: float) -> tuple[MeasuredStep, Position]:
-        """Measure a step while the fingers close to a width, and return where they came to rest too."""
-        closing = asyncio.ensure_future(self._rig.close_to(width_mm))
-        try:
-            return await self._measure(step), await closing
-        finally:
-            closing.cancel()
-            await asyncio.gather(closing, return_exceptions=True)
 
     async def confirmed(self, width_mm: float, before: Step | None, touching: Step) -> Onset:
         """Confirm a contact by as many frames as a step has, at the same width; else search on.

@@ -157,39 +157,34 @@ def test_the_search_goes_count_by_count_also_where_the_jaws_were_asked_to_open_b
         assert -np.diff([opened.width_mm, *widths_mm]) == pytest.approx(count_mm), over_mm
 
 
-def test_the_fingers_close_on_from_where_nothing_touched_while_that_is_measured_again():
-    class Closes(WrittenRig):
-        """Fingers whose moves can be waited for."""
+@pytest.mark.parametrize(
+    ("opened_mm", "measured_mm"),
+    [
+        (FRUIT_MM + 0.7, [0.3, -0.1, -0.1]),
+        (FRUIT_MM + 0.1, [-0.3, 0.1, -0.3]),
+        # A fruit that has come nearer meanwhile touches already: the jaws open by a step.
+        (FRUIT_MM - 0.1, [-0.5, -0.1, 0.5, 0.1, -0.3, -0.3]),
+    ],
+    ids=["two steps", "one step", "none"],
+)
+def test_where_nothing_touched_is_measured_again_only_if_the_next_step_shows_a_contact(opened_mm, measured_mm):
+    measured = list[float]()
 
-        def __init__(self) -> None:
-            super().__init__()
-            self.closing = asyncio.Event()
+    async def measure(step: Step) -> MeasuredStep:
+        measured.append(step.move.width_mm - FRUIT_MM)
+        contact = SimpleNamespace(is_firm=bool(step.image.any()))
+        return cast("MeasuredStep", SimpleNamespace(step=step, contact=contact))
 
-        async def close_to(self, width_mm: float) -> Position:
-            self.closing.set()
-            return await super().close_to(width_mm)
-
-    async def scenario(opened_mm: float):
-        rig = Closes()
-        measured = list[float]()
-
-        async def measure(step: Step) -> MeasuredStep:
-            if not measured:
-                await rig.closing.wait()
-            measured.append(step.move.width_mm)
-            contact = SimpleNamespace(is_firm=bool(step.image.any()))
-            return cast("MeasuredStep", SimpleNamespace(step=step, contact=contact))
-
+    async def scenario():
+        rig = WrittenRig()
         async with asyncio.timeout(10):
-            before, start = await onset(rig, BLUEBERRY, await rig.open(opened_mm), measure)
-        assert measured[0] == opened_mm
-        assert before is not None
-        assert before.move.width_mm >= FRUIT_MM > start.step.move.width_mm
-        assert before.move.width_mm - start.step.move.width_mm == pytest.approx(rig.finest_step_mm)
+            return rig, await onset(rig, BLUEBERRY, await rig.open(opened_mm), measure)
 
-    asyncio.run(scenario(FRUIT_MM + 0.1))
-    # A fruit that has come nearer meanwhile touches already: the jaws open again.
-    asyncio.run(scenario(FRUIT_MM - 0.1))
+    rig, (before, start) = asyncio.run(scenario())
+    assert measured == pytest.approx(measured_mm)
+    assert before is not None
+    assert before.move.width_mm >= FRUIT_MM > start.step.move.width_mm
+    assert before.move.width_mm - start.step.move.width_mm == pytest.approx(rig.finest_step_mm)
 
 
 def test_jaws_that_something_keeps_from_opening_further_have_the_onset_where_they_are():

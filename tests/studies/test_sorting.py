@@ -92,9 +92,7 @@ class TestSpecimens:
 
 
 class TestPressing:
-    def test_a_fruit_that_is_measured_while_the_jaws_close_has_images_on_the_way_and_steps_after_it(
-        self, tmp_path
-    ):
+    def test_a_fruit_that_is_measured_while_the_jaws_close_has_images_on_the_way_and_steps_after_it(self, tmp_path):
         blueberry = (ROOT / "recipes" / "blueberry.yaml").read_text()
         own = blueberry.replace("\nsteps:", "\nsteps:\n  measured: while_closing")
         (tmp_path / "blueberry.yaml").write_text(own)

@@ -55,6 +55,8 @@ class Inspector:
         self._settings, self._arm = configuration.service, configuration.arm
         self._alarms, self._metrics = alarms, metrics
         self._reached: Position | None = None
+        self._measures_ahead = True
+        """Whether frames are measured as they come. Not one that may need no measurement: it would slow the motion."""
         self._goes_on = asyncio.Event()
         """Set when a measured step lets another one be made."""
 
@@ -155,6 +157,8 @@ class Inspector:
         self._reached = None
         await self._vision.begin_press()
         rig, recipe, plan = self._rig(now), now.active.recipe, now.active.recipe.steps
+        # Where the fruit was met before, the first frame is beside it.
+        self._measures_ahead = plan.start_width_mm is not None or now.met_mm is None
         try:
             if plan.start_width_mm is not None:
                 first = await self._vision.measure(await take_step(rig, recipe, 0, plan.start_width_mm))
@@ -198,6 +202,7 @@ class Inspector:
         """
         # Measured while the jaws open: they do so whatever it shows.
         measuring = asyncio.ensure_future(self._vision.measure(Step(-1, at, await rig.frames(1))))
+        self._measures_ahead = False
         try:
             opened = await back_off(rig, met)
             return opened, self._off_middle(now, await measuring)
@@ -374,7 +379,7 @@ class Inspector:
 
     def _measure_ahead(self, frame: Frame) -> None:
         self._count(frame)
-        if not frame.faults:
+        if not frame.faults and self._measures_ahead:
             self._vision.measure_ahead(frame)
 
     def _count(self, frame: Frame) -> None:
@@ -385,4 +390,6 @@ class Inspector:
         """A step of the approach, measured by itself."""
         self._devices.monitors[CAMERA].report_success()
         self._devices.monitors[GRIPPER].report_success()
-        return await self._vision.seek(step)
+        seen = await self._vision.seek(step)
+        self._measures_ahead = True
+        return seen
