@@ -52,7 +52,8 @@ def table(tasks: Sequence[Task]) -> list[str]:
 
 def main() -> None:
     """Compare, print the table, and put it into the decision."""
-    lines = table([Task(kind, group, "tuning", number) for kind in KINDS for group in GROUPS for number in range(FRUIT)])
+    tasks = [Task(kind, group, "tuning", number) for kind in KINDS for group in GROUPS for number in range(FRUIT)]
+    lines = table(tasks)
     print("\n".join(lines))
     write(DOCUMENT, {"pauses": lines})
 
