@@ -30,11 +30,14 @@ def test_a_persons_stop_and_the_last_fruit_outlive_a_killed_station(ready, opera
     ready.twin(do="fruit", kind="blueberry", seed=1, bruised=True)
     soft = ready.end(ready.begin())
     assert soft.outcome != "PASS", "only of others every image is kept"
-    lost = ready.begin()
     operator.open("/")
+    # So slow a gripper that the fruit is still under way when the station is killed.
+    ready.twin(do="set", device="gripper", fault="delayed", amount=0.5)
+    lost = ready.begin()
     operator.hold("[data-hold]:has-text('Stop')")
     before = ready.until(lambda state: state.stopping)
     ready.process("service").kill()
+    ready.twin(do="clear", device="gripper")
 
     def stands(state):
         return state.boot != before.boot and state.state == "stopped"
