@@ -389,7 +389,14 @@ def pace_table(shipped: Mapping[str, Recipe], results: Mapping[str, Pace], other
             f"{other[kind].a_minute:.0f} {WAYS[otherwise]}",
         )
         rows.append(f"| {' | '.join(cells)} |")
-    names = ("fruit", "measured", "fruit a minute", "trigger to outcome, s", "to the next trigger, s", "otherwise")
+    names = (
+        "fruit",
+        "measured",
+        "fruit a minute",
+        "trigger to outcome, s",
+        "to the next trigger, s",
+        "measured otherwise",
+    )
     return [f"| {' | '.join(names)} |", "|---" * 6 + "|", *rows]
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from sections import write
 from sorting.specimens import KINDS, Task, draw
+from sorting.sweep import FRAME_S
 
 from station.settings.recipe import find_recipe
 from station.twin.contact import FruitOnGel
@@ -21,7 +22,7 @@ LONGER_PAUSE_S = 0.2
 """The shipped recipes' until 2026-11-25."""
 GROUPS = ("sound", "severe")
 FRUIT = 60
-FRAME_S = 1 / 30
+"""Of each kind and group."""
 
 
 def ratio(task: Task) -> float:

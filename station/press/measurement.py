@@ -79,6 +79,8 @@ class PressMeasurement:
         known = {key: contact for key, (_, contact) in self._known.items() if contact.is_firm}
         contact = measure_step(self._method, step.images, known=known, mean=image)
         self._known.clear()
+        if len(step.images) == 1 and contact.is_firm:  # as in `seek`
+            self._known[id(image)] = image, contact
         return MeasuredStep(step, image, contact)
 
 

@@ -124,8 +124,9 @@ class State:
     flags: set[Flag] = field(default_factory=set)
     confidence: float = 0.0
     agreed: float = 1.0
-    firm_only: bool = False
     """How far the step's frames agree, 0 to 1."""
+    firm_only: bool = False
+    """Whether the search for weak contacts is left out."""
 
 
 class RobustMethod:

@@ -286,3 +286,7 @@ def test_a_frame_that_has_shown_a_firm_contact_in_the_search_is_not_measured_aga
     assert measured == [(10, True)], "no weak contact is searched for"
     measurement.seek(Step(0, Position(15.0), cast("Any", frames)))
     assert measured[1:] == [(level, False) for level in again], "each frame once, then their mean"
+    measured.clear()
+    measurement.measure(Step(-1, Position(15.0), cast("Any", frames[:1])))
+    measurement.measure(Step(0, Position(15.0), cast("Any", frames)))
+    assert [level for level, _ in measured] == [10, *again], "likewise where the whole frame is measured at once"

@@ -3,7 +3,7 @@
 import math
 import time
 from itertools import pairwise
-from statistics import median
+from statistics import mean
 
 from station.devices.camera.interface import Camera, CameraError, Frame, FrameFault, NoFrameError, describe
 from station.devices.camera.open import camera_from
@@ -57,9 +57,10 @@ async def _some_frames(camera: Camera, *, recorded: bool) -> list[Frame]:
 
 def _judged(camera: Camera, frames: list[Frame]) -> CheckResult:
     description = camera.description
-    # The usual interval: one pause of a busy machine says nothing of the camera.
-    intervals_s = [after.captured_s - before.captured_s for before, after in pairwise(frames)]
-    rate = 1 / max(_SHORTEST_S, median(intervals_s)) if intervals_s else 0.0
+    intervals_s = sorted(after.captured_s - before.captured_s for before, after in pairwise(frames))
+    # Without the longest: one pause of a busy machine says nothing of the camera, frames that are lost repeatedly do.
+    usual_s = intervals_s[:-1] or intervals_s
+    rate = 1 / max(_SHORTEST_S, mean(usual_s)) if usual_s else 0.0
     faults = sorted(frozenset().union(*(frame.faults for frame in frames)))
     seen = {"camera": description.name, "width_px": description.width_px, "height_px": description.height_px}
     found = (

@@ -41,10 +41,11 @@ class Timed:
         ([FRAME_S] * 15, "ok"),
         ([FRAME_S] * 7 + [0.5] + [FRAME_S] * 7, "ok"),
         ([1 / 20] * 15, "warning"),
+        ([FRAME_S, FRAME_S, 2 * FRAME_S] * 5, "warning"),
     ],
-    ids=["as it should be", "one pause of a busy machine", "20 frames/s"],
+    ids=["as it should be", "one pause of a busy machine", "20 frames/s", "every fourth frame lost"],
 )
-def test_a_camera_is_slow_whose_frames_usually_come_late(monkeypatch, intervals_s, verdict):
+def test_a_camera_is_slow_whose_frames_come_late_more_than_once(monkeypatch, intervals_s, verdict):
     monkeypatch.setattr(probe, "camera_from", lambda _settings: Timed(intervals_s))
     [result] = asyncio.run(probe.probe_camera(CameraSettings()))
     assert result.verdict == verdict
