@@ -146,6 +146,16 @@ class Bench:
 
         service.entered = told
 
+    async def until(self, is_so: Callable[[], Any], patience_s: float = PATIENCE_S) -> None:
+        """Wait until something is so; a failure says what the station was at meanwhile."""
+        try:
+            await eventually(is_so, patience_s)
+        except AssertionError as error:
+            service = self.station.service
+            assert service is not None
+            alarms = sorted(alarm.id for alarm in service.alarms.alarms.active)
+            raise AssertionError(f"{error}: {self.phase}, {service._devices.faults}, {alarms}") from error
+
     async def reach(self, phase: State) -> None:
         """Wait for a phase, however short it is."""
         if self.phase is not phase:

@@ -26,9 +26,8 @@ def test_the_arm_follows_the_first_contact_and_the_fruit_that_the_border_cut_pas
     async def scenario():
         async with bench(roomy(bench=False)) as cell:
             assert (await cell.line.order(CommandName.CHANGE_RECIPE, 1)).done
-            async with asyncio.timeout(150):  # the arm's program is uploaded, and the gripper activated at home
-                while cell.phase is not State.IDLE:
-                    await asyncio.sleep(0.1)
+            # The arm's program is uploaded, and the gripper activated at home.
+            await cell.until(lambda: cell.phase is State.IDLE, patience_s=150)
             cell.lay("strawberry", FRUIT, x_mm=RIGHT_MM, y_mm=DOWN_MM)
             sensor_mm = []
             cell.at(State.RECORDING_ACCEPT, lambda: sensor_mm.append(cell.twin.world.sensor_mm()))

@@ -19,9 +19,8 @@ from station.vocabulary import Reason, Refusal
 async def ready_with_arm(cell):
     """A cell with its arm at rest, and a sound blueberry in the nest."""
     assert (await cell.line.order(CommandName.CHANGE_RECIPE, 2)).done
-    async with asyncio.timeout(150):  # the arm's program is uploaded, and the gripper activated
-        while cell.phase is not State.IDLE:
-            await asyncio.sleep(0.1)
+    # The arm's program is uploaded, and the gripper activated.
+    await cell.until(lambda: cell.phase is State.IDLE, patience_s=150)
     cell.lay("blueberry", 1)
 
 
