@@ -17,12 +17,13 @@ import time
 from pathlib import Path
 
 import psutil
-from bench_plc import HOST, SCAN_US, Figures, built
+from bench_plc import HOST, SCAN_US, built
 from soak.cell import EARLIER, Cell, running
 from soak.document import CHART, Ending, draw, page
-from soak.samples import Sample, counts, processes, scrape, size_mb
+from soak.samples import Latency, Sample, counts, processes, scrape, size_mb
 
 from station.errors import StationError
+from station.records.database import FILE_NAME, records_folder
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "soak.md"
 MINUTES = 60.0
@@ -31,7 +32,7 @@ _ARRIVAL_S = 60.0
 """Until PostgreSQL has everything, once the line has ended."""
 
 
-async def latency(load: Path, port: int, ended: asyncio.Event) -> Figures | None:
+async def latency(load: Path, port: int, ended: asyncio.Event) -> Latency | None:
     """What a PLC that reads each scan waits for its replies, for one window; None where the soak ends in it.
 
     Args:
@@ -47,7 +48,7 @@ async def latency(load: Path, port: int, ended: asyncio.Event) -> Figures | None
     try:
         await asyncio.wait([asking, ending], return_when=asyncio.FIRST_COMPLETED)
         printed = asking.result()[0] if asking.done() else b""
-        return Figures(*map(float, printed.split())) if printed else None
+        return Latency(*map(float, printed.split()[1:])) if printed else None
     finally:
         ending.cancel()
         with contextlib.suppress(ProcessLookupError):
@@ -89,7 +90,7 @@ async def soak(minutes: float, samples: list[Sample]) -> Ending:
             )
 
 
-def sampled(cell: Cell, figures: Figures, at_s: float) -> Sample:
+def sampled(cell: Cell, figures: Latency, at_s: float) -> Sample:
     """Read everything once.
 
     Args:
@@ -97,10 +98,11 @@ def sampled(cell: Cell, figures: Figures, at_s: float) -> Sample:
         figures: the PLC's latency in the window that ends now.
         at_s: since the first fruit.
     """
-    metrics = cell.site.metrics
+    metrics, records = cell.site.metrics, records_folder(cell.site.home)
     text = scrape(f"http://{metrics.host}:{metrics.port}/metrics")
     found = processes(psutil.Process().children(recursive=True))
-    return Sample(at_s, found, figures, counts(text), size_mb(cell.site.home / "records"))
+    images_mb, database_mb = size_mb(records, "images/**/*.png"), size_mb(records, f"{FILE_NAME}*")
+    return Sample(at_s, found, figures, counts(text), images_mb, database_mb)
 
 
 async def unsent(cell: Cell) -> int:
@@ -123,8 +125,8 @@ def progress(sample: Sample) -> str:
     """One line for who waits."""
     memory = ", ".join(f"{name} {each.unique_mb:.1f} MB" for name, each in sample.processes.items())
     return (
-        f"{sample.at_s:5.0f} s: {sample.counts.fruit:.0f} fruit; {memory}; PLC {sample.latency.p99_us:.0f} µs; records "
-        f"{sample.records_mb:.0f} MB; outbox {sample.counts.waiting:.0f} waiting"
+        f"{sample.at_s:5.0f} s: {sample.counts.fruit:.0f} fruit; {memory}; PLC {sample.latency.p99_us:.0f} µs; images "
+        f"{sample.images_mb:.0f} MB; outbox {sample.counts.waiting:.0f} waiting"
     )
 
 

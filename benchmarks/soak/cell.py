@@ -141,7 +141,13 @@ def configuration(folder: Path, server: Server, broker_port: int) -> tuple[Path,
         "outbox": {
             "station": "soak",
             "longest_pause_s": 1.0,
-            "postgresql": {"enabled": True, "host": str(server.folder), "port": PORT, "user": "fruit", "tls": "disable"},
+            "postgresql": {
+                "enabled": True,
+                "host": str(server.folder),
+                "port": PORT,
+                "user": "fruit",
+                "tls": "disable",
+            },
             "mqtt": {"enabled": True, "host": HOST, "port": broker_port},
         },
     }

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import psutil
-from bench_plc import Figures
 from looking.rounds import OWN_PHASES
 from prometheus_client.parser import text_string_to_metric_families
 
@@ -43,11 +42,18 @@ class StationCounts(NamedTuple):
     """Time of the cycle's phases in which nothing moves and no frame is awaited."""
     whole_s: float
     """Time from triggers to durable outcomes."""
+    images_kept: float
     images_removed: float
     waiting: float
     """Entries that the outbox has not sent yet, of both destinations."""
-    destinations: int
-    """To which it is connected."""
+
+
+class Latency(NamedTuple):
+    """What a PLC that reads each scan waited for its replies in one window."""
+
+    p50_us: float
+    p99_us: float
+    worst_us: float
 
 
 class Sample(NamedTuple):
@@ -56,10 +62,12 @@ class Sample(NamedTuple):
     at_s: float
     """Since the first fruit."""
     processes: dict[str, ProcessSample]
-    latency: Figures
+    latency: Latency
     counts: StationCounts
-    records_mb: float
-    """Space of all files in the records' folder."""
+    images_mb: float
+    """Space of the records' images."""
+    database_mb: float
+    """Space of the records' database with its log."""
 
 
 def processes(marked: Sequence[psutil.Process]) -> dict[str, ProcessSample]:
@@ -87,7 +95,8 @@ def counts(text: str) -> StationCounts:
     Args:
         text: the page.
     """
-    fruit = own_s = whole_s = removed = waiting = connected = 0.0
+    fruit = own_s = whole_s = waiting = 0.0
+    images = dict.fromkeys(("kept", "removed"), 0.0)
     for family in text_string_to_metric_families(text):
         for sample in family.samples:
             name, labels = sample.name, sample.labels
@@ -97,13 +106,11 @@ def counts(text: str) -> StationCounts:
                 own_s += sample.value
             elif name == "station_inspection_duration_seconds_sum":
                 whole_s += sample.value
-            elif name == "station_records_images_total" and labels["result"] == "removed":
-                removed += sample.value
+            elif name == "station_records_images_total" and labels["result"] in images:
+                images[labels["result"]] += sample.value
             elif name == "station_outbox_waiting":
                 waiting += sample.value
-            elif name == "station_outbox_connected":
-                connected += sample.value
-    return StationCounts(fruit, own_s, whole_s, removed, waiting, round(connected))
+    return StationCounts(fruit, own_s, whole_s, images["kept"], images["removed"], waiting)
 
 
 def scrape(url: str) -> str:
@@ -116,14 +123,15 @@ def scrape(url: str) -> str:
         return answer.read().decode()
 
 
-def size_mb(folder: Path) -> float:
-    """Return the size of all files below a folder, of which some may go meanwhile.
+def size_mb(folder: Path, pattern: str) -> float:
+    """Return the size of files in a folder, of which some may go meanwhile.
 
     Args:
         folder: where.
+        pattern: of their names.
     """
     size = 0
-    for path in folder.rglob("*"):
+    for path in folder.glob(pattern):
         with contextlib.suppress(FileNotFoundError):
             size += path.stat().st_size
     return size / _MB
