@@ -89,9 +89,9 @@ def test_the_page_tells_a_process_that_grows_from_one_that_does_not(soak):
 def test_a_short_run_decides_nothing_and_says_so(soak, windows):
     document, samples = soak
     ending = document.Ending({}, None, 10.0 * windows)
-    text = " ".join(document.page(made(samples, windows=windows), ending, 60, "", 1.0).splitlines())
+    text = document.page(made(samples, windows=windows), ending, 60, "", 1.0)
     assert "**Not decided**" in text
-    assert "It was to run for 60 minutes" in text
+    assert "It was to run for 60 minutes" in " ".join(text.splitlines())
     assert row(text, "service")[0][-2] == "not decided"
 
 
