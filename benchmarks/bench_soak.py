@@ -14,6 +14,7 @@ import signal
 import sys
 import tempfile
 import time
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import psutil
@@ -30,6 +31,15 @@ MINUTES = 60.0
 WINDOW_S = 10.0
 _ARRIVAL_S = 60.0
 """Until PostgreSQL has everything, once the line has ended."""
+
+
+@dataclass(slots=True)
+class Run:
+    """What a run has found so far: it is written, whatever ends it."""
+
+    samples: list[Sample] = field(default_factory=list)
+    """One for each window."""
+    ending: Ending = field(default_factory=lambda: Ending({}, None))
 
 
 async def latency(load: Path, port: int, ended: asyncio.Event) -> Latency | None:
@@ -56,12 +66,12 @@ async def latency(load: Path, port: int, ended: asyncio.Event) -> Latency | None
         await asyncio.gather(asking, ending, return_exceptions=True)
 
 
-async def soak(minutes: float, samples: list[Sample]) -> Ending:
+async def soak(minutes: float, run: Run) -> None:
     """Run the cell and sample it.
 
     Args:
         minutes: for so long, from the first fruit.
-        samples: gets one for each window.
+        run: gets everything.
 
     Raises:
         StationError: a process does not start, or the line ended.
@@ -79,15 +89,12 @@ async def soak(minutes: float, samples: list[Sample]) -> Ending:
                     await cell.running
                 figures = await latency(load, cell.site.modbus.port, ended)
                 if figures is not None:
-                    samples.append(await asyncio.to_thread(sampled, cell, figures, time.monotonic() - began_s))
-                    print(progress(samples[-1]), file=sys.stderr)
+                    run.samples.append(await asyncio.to_thread(sampled, cell, figures, time.monotonic() - began_s))
+                    print(progress(run.samples[-1]), file=sys.stderr)
             cell.running.cancel()
             await asyncio.gather(cell.running, return_exceptions=True)
-            return Ending(
-                decided={str(how): number for how, number in cell.line.summary.decided.items() if number},
-                unsent=None if ended.is_set() else await unsent(cell),
-                took_s=time.monotonic() - began_s,
-            )
+            decided = {str(how): number for how, number in cell.line.summary.decided.items() if number}
+            run.ending = Ending(decided, None if ended.is_set() else await unsent(cell))
 
 
 def sampled(cell: Cell, figures: Latency, at_s: float) -> Sample:
@@ -135,19 +142,18 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=MINUTES, help="from the first fruit on")
     asked = parser.parse_args()
-    samples: list[Sample] = []
-    ending, trouble = Ending({}, None, 0.0), ""
+    run, trouble = Run(), ""
     try:
-        ending = asyncio.run(soak(asked.minutes, samples))
+        asyncio.run(soak(asked.minutes, run))
     except (StationError, OSError, SystemExit) as error:
         trouble = str(error)
         print(trouble, file=sys.stderr)
-    if samples:
-        text = page(samples, ending, asked.minutes, trouble, os.getloadavg()[2])
+    if run.samples:
+        text = page(run.samples, run.ending, asked.minutes, trouble, os.getloadavg()[2])
         print(text)
         DOCUMENT.write_text(text, encoding="utf-8")
-        draw(samples, CHART)
-    return 1 if trouble or not samples else 0
+        draw(run.samples, CHART)
+    return 1 if trouble or not run.samples else 0
 
 
 if __name__ == "__main__":

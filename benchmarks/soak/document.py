@@ -41,7 +41,6 @@ class Ending(NamedTuple):
     """Fruit by the line's decision."""
     unsent: int | None
     """Inspections that PostgreSQL did not get; None where that was not awaited."""
-    took_s: float
 
 
 class Series(NamedTuple):

@@ -37,9 +37,9 @@ def test_an_hour_decides_about_one_megabyte_an_hour(mb_per_hour, expected):
 
 @pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
 def test_the_interval_holds_the_true_slope_as_often_as_it_promises_also_where_values_remember(memory):
-    found = [slope(AT_S, 2.0 * np.array(AT_S) / 3600 + remembering(seed, memory, 1.0)) for seed in range(100)]
-    # 95 of 100 are expected: fewer than 88 come of such an interval by chance once in 500 times.
-    assert sum(each.low <= 2.0 <= each.high for each in found) >= 88
+    found = [slope(AT_S, 2.0 * np.array(AT_S) / 3600 + remembering(seed, memory, 1.0)) for seed in range(50)]
+    # 47.5 of 50 are expected: fewer than 44 come of such an interval by chance once in 80 times; the seeds are fixed.
+    assert sum(each.low <= 2.0 <= each.high for each in found) >= 44
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def row(text, begins):
 
 def test_the_page_tells_a_process_that_grows_from_one_that_does_not(soak):
     document, samples = soak
-    text = document.page(made(samples, leak_mb_per_hour=4.0), document.Ending({"PASS": 1436}, 0, 3600.0), 60, "", 1.0)
+    text = document.page(made(samples, leak_mb_per_hour=4.0), document.Ending({"PASS": 1436}, 0), 60, "", 1.0)
     memory, pieces = row(text, "service")
     assert memory[-2:] == ["no", "0"]
     assert (pieces[3], pieces[6]) == ("yes", "yes")
@@ -88,7 +88,7 @@ def test_the_page_tells_a_process_that_grows_from_one_that_does_not(soak):
 @pytest.mark.parametrize("windows", [1, 9, 150])
 def test_a_short_run_decides_nothing_and_says_so(soak, windows):
     document, samples = soak
-    ending = document.Ending({}, None, 10.0 * windows)
+    ending = document.Ending({}, None)
     text = document.page(made(samples, windows=windows), ending, 60, "", 1.0)
     assert "**Not decided**" in text
     assert "It was to run for 60 minutes" in " ".join(text.splitlines())
@@ -98,13 +98,13 @@ def test_a_short_run_decides_nothing_and_says_so(soak, windows):
 def test_a_process_that_was_started_again_is_named_and_its_slope_is_that_of_the_new_one(soak):
     document, samples = soak
     grows_then_restarts = made(samples, leak_mb_per_hour=0.0, pid_after=200)
-    text = document.page(grows_then_restarts, document.Ending({}, 0, 3600.0), 60, "", 1.0)
+    text = document.page(grows_then_restarts, document.Ending({}, 0), 60, "", 1.0)
     assert row(text, "service")[0][-1] == "1"
 
 
 def test_an_error_that_ended_the_run_is_on_the_page(soak):
     document, samples = soak
-    text = document.page(made(samples), document.Ending({}, None, 0.0), 60, "the panels ended", 1.0)
+    text = document.page(made(samples), document.Ending({}, None), 60, "the panels ended", 1.0)
     assert "It ended early: the panels ended" in text
 
 
