@@ -69,7 +69,8 @@ def clients(who: str, count: int, host: str, port: int) -> Iterator[None]:
         port: of the pages.
     """
     command = [sys.executable, str(CLIENTS), host, str(port), str(count), who]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    # A session of its own: Ctrl-C on the terminal is the benchmark's, which ends them.
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
     try:
         if process.stdout is None or process.stdout.readline() != "looking\n":
             raise SystemExit(f"the {who} were told nothing")

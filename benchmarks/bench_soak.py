@@ -1,0 +1,160 @@
+"""Eight hours in one: the whole station at its full pace, and what grows in its processes meanwhile.
+
+Run with `./run bench soak [--minutes 60]`: the twin, the station's processes, the line, three panels and two readers,
+PostgreSQL and an MQTT broker, with the images at their quota. Every ten seconds each process's memory, descriptors and
+threads are read, the PLC's latency, the cycle's time, the records' space and what waits in the outbox. Ctrl-C ends it;
+what was sampled until then is written. Writes `docs/soak.md` and `docs/images/soak.svg`.
+"""
+
+import argparse
+import asyncio
+import contextlib
+import os
+import signal
+import sys
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import psutil
+from bench_plc import HOST, SCAN_US, built
+from soak.cell import EARLIER, Cell, running
+from soak.document import CHART, Ending, draw, page
+from soak.samples import Latency, Sample, counts, processes, scrape, size_mb
+
+from station.errors import StationError
+from station.records.database import FILE_NAME, records_folder
+
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "soak.md"
+MINUTES = 60.0
+WINDOW_S = 10.0
+_ARRIVAL_S = 60.0
+"""Until PostgreSQL has everything, once the line has ended."""
+
+
+@dataclass(slots=True)
+class Run:
+    """What a run has found so far: it is written, whatever ends it."""
+
+    samples: list[Sample] = field(default_factory=list)
+    """One for each window."""
+    ending: Ending = field(default_factory=lambda: Ending({}, None))
+
+
+async def latency(load: Path, port: int, ended: asyncio.Event) -> Latency | None:
+    """What a PLC that reads each scan waits for its replies, for one window; None where the soak ends in it.
+
+    Args:
+        load: the client program.
+        port: of the PLC interface.
+        ended: set where the soak is to end.
+    """
+    arguments = (HOST, str(port), "1", str(WINDOW_S), str(SCAN_US))
+    process = await asyncio.create_subprocess_exec(
+        load, *arguments, stdout=asyncio.subprocess.PIPE, start_new_session=True
+    )
+    asking, ending = asyncio.create_task(process.communicate()), asyncio.create_task(ended.wait())
+    try:
+        await asyncio.wait([asking, ending], return_when=asyncio.FIRST_COMPLETED)
+        printed = asking.result()[0] if asking.done() else b""
+        return Latency(*map(float, printed.split()[1:])) if printed else None
+    finally:
+        ending.cancel()
+        with contextlib.suppress(ProcessLookupError):
+            process.kill()
+        await asyncio.gather(asking, ending, return_exceptions=True)
+
+
+async def soak(minutes: float, run: Run) -> None:
+    """Run the cell and sample it.
+
+    Args:
+        minutes: for so long, from the first fruit.
+        run: gets everything.
+
+    Raises:
+        StationError: a process does not start, or the line ended.
+        SystemExit: a program is missing, or the pages do not answer.
+    """
+    ended = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, ended.set)
+    with tempfile.TemporaryDirectory() as folder:
+        load = built("load", Path(folder))
+        async with running() as cell:
+            began_s = time.monotonic()
+            while time.monotonic() - began_s < 60 * minutes and not ended.is_set():
+                if cell.running.done():
+                    await cell.running
+                figures = await latency(load, cell.site.modbus.port, ended)
+                if figures is not None:
+                    run.samples.append(await asyncio.to_thread(sampled, cell, figures, time.monotonic() - began_s))
+                    print(progress(run.samples[-1]), file=sys.stderr)
+            cell.running.cancel()
+            await asyncio.gather(cell.running, return_exceptions=True)
+            decided = {str(how): number for how, number in cell.line.summary.decided.items() if number}
+            run.ending = Ending(decided, None if ended.is_set() else await unsent(cell))
+
+
+def sampled(cell: Cell, figures: Latency, at_s: float) -> Sample:
+    """Read everything once.
+
+    Args:
+        cell: what runs.
+        figures: the PLC's latency in the window that ends now.
+        at_s: since the first fruit.
+    """
+    metrics, records = cell.site.metrics, records_folder(cell.site.home)
+    text = scrape(f"http://{metrics.host}:{metrics.port}/metrics")
+    found = processes(psutil.Process().children(recursive=True))
+    images_mb, database_mb = size_mb(records, "images/**/*.png"), size_mb(records, f"{FILE_NAME}*")
+    return Sample(at_s, found, figures, counts(text), images_mb, database_mb)
+
+
+async def unsent(cell: Cell) -> int:
+    """How many of the decided inspections PostgreSQL does not have, with those from before, after some time for them.
+
+    Args:
+        cell: whose line has ended.
+    """
+    answered = sum(number for how, number in cell.line.summary.decided.items() if how in {"PASS", "FAIL", "NO_RESULT"})
+    until_s, missing = time.monotonic() + _ARRIVAL_S, answered
+    while missing > 0 and time.monotonic() < until_s:
+        await asyncio.sleep(0.5)
+        with cell.server.connect() as connection:
+            found = connection.execute("SELECT count(DISTINCT sequence) FROM inspections").fetchone()
+        missing = EARLIER + answered - (found[0] if found else 0)
+    return max(0, missing)
+
+
+def progress(sample: Sample) -> str:
+    """One line for who waits."""
+    memory = ", ".join(f"{name} {each.unique_mb:.1f} MB" for name, each in sample.processes.items())
+    return (
+        f"{sample.at_s:5.0f} s: {sample.counts.fruit:.0f} fruit; {memory}; PLC {sample.latency.p99_us:.0f} µs; images "
+        f"{sample.images_mb:.0f} MB; outbox {sample.counts.waiting:.0f} waiting"
+    )
+
+
+def main() -> int:
+    """Run, and write what was sampled."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--minutes", type=float, default=MINUTES, help="from the first fruit on")
+    asked = parser.parse_args()
+    run, trouble = Run(), ""
+    try:
+        asyncio.run(soak(asked.minutes, run))
+    except (StationError, OSError, SystemExit) as error:
+        trouble = str(error)
+        print(trouble, file=sys.stderr)
+    if run.samples:
+        text = page(run.samples, run.ending, asked.minutes, trouble, os.getloadavg()[2])
+        print(text)
+        DOCUMENT.write_text(text, encoding="utf-8")
+        draw(run.samples, CHART)
+    return 1 if trouble or not run.samples else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

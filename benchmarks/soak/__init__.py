@@ -1,0 +1,1 @@
+"""The soak: a whole station for an hour or more, and what grows in it."""

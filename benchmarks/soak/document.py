@@ -1,0 +1,320 @@
+"""The soak's page and its plot."""
+
+import os
+import statistics
+import textwrap
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from sorting import tables
+
+from .cell import ACCEPTED_SHARE, BATCH, CLOSING_MM_S, DAMAGED_SHARE, EARLIER, PANELS, QUOTA_MB, READERS
+from .samples import MARKS, TWIN, ProcessSample, Sample
+from .slopes import CONFIDENCE, Slope, Verdict, slope
+
+CHART = Path(__file__).resolve().parents[2] / "docs" / "images" / "soak.svg"
+WARM_UP_SHARE = 0.25
+"""Of the run, over which nothing is decided: allocators, caches and pools fill, and so do the images' quota."""
+MOST_MB_PER_HOUR = 1.0
+MOST_PIECES_PER_HOUR = 1.0
+"""Descriptors and threads: flat is less than one more in an hour."""
+MOST_SHARE_PER_HOUR = 0.1
+"""Latency and times: flat is less than a tenth of their median more in an hour."""
+WIDTH = 120
+"""Of the page's lines."""
+DECIDES_S = 1200.0
+"""Of samples after the warm-up: fewer decide nothing, as what rises by steps may not have made one. An estimate."""
+PACE_A_MINUTE = 18
+"""Of a line by the shipped recipes: docs/line-pace.md."""
+FOUND = ""
+
+
+class Ending(NamedTuple):
+    """How the run ended."""
+
+    decided: dict[str, int]
+    """Fruit by the line's decision."""
+    unsent: int | None
+    """Inspections that PostgreSQL did not get; None where that was not awaited."""
+
+
+class Series(NamedTuple):
+    """A quantity over time."""
+
+    name: str
+    at_s: list[float]
+    values: list[float]
+
+    @property
+    def slope(self) -> Slope | None:
+        """How it rises; None for too few samples."""
+        return slope(self.at_s, self.values)
+
+    def below(self, limit: float) -> Verdict:
+        """Whether it rises by less than a limit in an hour.
+
+        Args:
+            limit: in the series' own unit.
+        """
+        rise = self.slope
+        decides = rise is not None and self.at_s[-1] - self.at_s[0] >= DECIDES_S
+        return rise.below(limit) if rise is not None and decides else Verdict.UNDECIDED
+
+
+def settled(samples: Sequence[Sample]) -> list[Sample]:
+    """Return the samples after the warm-up."""
+    return [each for each in samples if each.at_s >= WARM_UP_SHARE * samples[-1].at_s]
+
+
+def of_process(samples: Sequence[Sample], name: str, what: Callable[[ProcessSample], float]) -> Series:
+    """Return a quantity of a process, since its last restart.
+
+    Args:
+        samples: of the time of interest.
+        name: of the process.
+        what: the quantity.
+    """
+    present = [(each.at_s, each.processes[name]) for each in samples if name in each.processes]
+    last = [(at_s, process) for at_s, process in present if process.pid == present[-1][1].pid]
+    return Series(name, [at_s for at_s, _ in last], [what(process) for _, process in last])
+
+
+def by_fruit(samples: Sequence[Sample], name: str, total: Callable[[Sample], float]) -> Series:
+    """Return a counted time for each fruit, of the windows in which there was one.
+
+    Args:
+        samples: of the time of interest.
+        name: of the quantity.
+        total: the time counted until a sample; a restart of the service sets it back, and that window is left out.
+    """
+    pairs = [(a, b) for a, b in pairwise(samples) if b.counts.fruit > a.counts.fruit]
+    means = [(total(b) - total(a)) / (b.counts.fruit - a.counts.fruit) for a, b in pairs]
+    return Series(name, [b.at_s for _, b in pairs], means)
+
+
+def timings(samples: Sequence[Sample]) -> list[Series]:
+    """Return what a line would feel: the PLC's latency and the cycle's times."""
+    at_s = [each.at_s for each in samples]
+    return [
+        Series("PLC's reply, p50, µs", at_s, [each.latency.p50_us for each in samples]),
+        Series("PLC's reply, p99, µs", at_s, [each.latency.p99_us for each in samples]),
+        by_fruit(samples, "cycle's own time, ms", lambda each: 1000 * each.counts.own_s),
+        by_fruit(samples, "trigger to outcome, s", lambda each: each.counts.whole_s),
+    ]
+
+
+def restarts(samples: Sequence[Sample], name: str) -> int:
+    """Return how often a process was another one than before."""
+    pids = [each.processes[name].pid for each in samples if name in each.processes]
+    return sum(before != after for before, after in pairwise(pids))
+
+
+def in_words(rise: Slope | None, digits: int) -> str:
+    """Return a slope with its interval."""
+    if rise is None:
+        return "too few samples"
+    middle, low, high = (f"{each:+.{digits}f}".replace("-", "\N{MINUS SIGN}") for each in rise)
+    return f"{middle} ({low} to {high})"
+
+
+def memory_table(samples: Sequence[Sample]) -> list[str]:
+    """Return each process's memory."""
+    after = settled(samples)
+    limit = f"under {MOST_MB_PER_HOUR:g} MB/h"
+    heads = ("MB: first", "after the warm-up", "last", "most", "resident, last", f"MB/h ({CONFIDENCE:.0%})")
+    lines = tables.header("process", *heads, limit, "restarts")
+    for name in present(samples):
+        every = of_process(samples, name, lambda each: each.unique_mb).values
+        late = of_process(after, name, lambda each: each.unique_mb)
+        resident = of_process(after, name, lambda each: each.resident_mb).values[-1]
+        figures = (f"{each:.1f}" for each in (every[0], late.values[0], late.values[-1], max(every), resident))
+        held = "" if name == TWIN else late.below(MOST_MB_PER_HOUR)
+        lines.append(tables.row(name, *figures, in_words(late.slope, 2), held, str(restarts(samples, name))))
+    return lines
+
+
+def pieces_table(samples: Sequence[Sample]) -> list[str]:
+    """Return each process's descriptors and threads."""
+    after = settled(samples)
+    names = [
+        f"{what}{column}" for what in ("descriptors: ", "threads: ") for column in ("least, most", "an hour", "flat")
+    ]
+    lines = tables.header("process", *names)
+    for name in present(samples):
+        cells = []
+        for what in (lambda each: each.descriptors, lambda each: each.threads):
+            late = of_process(after, name, what)
+            held = "" if name == TWIN else late.below(MOST_PIECES_PER_HOUR)
+            cells += [f"{min(late.values):.0f}, {max(late.values):.0f}", in_words(late.slope, 1), held]
+        lines.append(tables.row(name, *cells))
+    return lines
+
+
+def timings_table(samples: Sequence[Sample]) -> list[str]:
+    """Return the PLC's latency and the cycle's times."""
+    lines = tables.header("", "median", "least, most of a window", f"% an hour ({CONFIDENCE:.0%})", "flat")
+    for each in timings(settled(samples)):
+        if not each.values:
+            continue
+        middle = statistics.median(each.values)
+        share = each._replace(values=[100 * value / middle for value in each.values])
+        lines.append(
+            tables.row(
+                each.name,
+                f"{middle:,.4g}",
+                f"{min(each.values):,.4g}, {max(each.values):,.4g}",
+                in_words(share.slope, 1),
+                share.below(100 * MOST_SHARE_PER_HOUR),
+            )
+        )
+    return lines
+
+
+def present(samples: Sequence[Sample]) -> list[str]:
+    """Return the processes that were there after the warm-up, in their order."""
+    return [name for name in MARKS if any(name in each.processes for each in settled(samples))]
+
+
+def undecided(samples: Sequence[Sample]) -> str:
+    """Return what is to be done about slopes that the run was too short for; empty where there are none."""
+    after = settled(samples)
+    memory = [of_process(after, name, lambda each: each.unique_mb) for name in present(samples) if name != TWIN]
+    if all(each.below(MOST_MB_PER_HOUR) is not Verdict.UNDECIDED for each in memory):
+        return ""
+    return "\n**Not decided**: the run was too short for at least one process's memory; run it for longer.\n"
+
+
+def page(samples: Sequence[Sample], ending: Ending, minutes: float, trouble: str, load: float) -> str:
+    """Return the document.
+
+    Args:
+        samples: at least one.
+        ending: how the run ended.
+        minutes: for how long it was to run.
+        trouble: what ended it early, if anything did but a person.
+        load: of the machine.
+    """
+    last, after = samples[-1], settled(samples)
+    ran_min = last.at_s / 60
+    fruit = round(last.counts.fruit)
+    begins_min = next((each.at_s / 60 for each in samples if each.counts.images_removed), None)
+    removing = "none was removed" if begins_min is None else f"they were removed from minute {begins_min:.1f} on"
+    early = f" It was to run for {minutes:g} minutes." if last.at_s < 60 * minutes - 1 else ""
+    stopped = f" **It ended early: {trouble}.**" if trouble else ""
+    decisions = ", ".join(f"{number} {how}" for how, number in ending.decided.items()) or "not known"
+    unsent = "not awaited" if ending.unsent is None else str(ending.unsent)
+    ran = (
+        f"Written by `./run bench soak`, which ran for {ran_min:.0f} minutes.{early}{stopped} The station's own "
+        "processes, the twin and a line that lays fruit after fruit, as fast as the station takes them; "
+        f"{PANELS} panels with the page Run, {READERS} readers of the history, PostgreSQL and an MQTT broker. The "
+        "PLC's latency is that of a second client, which reads every 10 ms. Unverified on hardware."
+    )
+    worth = (
+        f"**{fruit} fruit**, {fruit / ran_min:.0f} a minute: a line at the shipped pace of {PACE_A_MINUTE} a minute "
+        f"lays so many in **{fruit / PACE_A_MINUTE / 60:.1f} hours**. What grows by the fruit is repeated so often; "
+        "what grows by the time, such as frames, heartbeats and streams, is as in any hour, and its slope is given for "
+        f"an hour. To have more fruit, the jaws close at {CLOSING_MM_S} mm/s (shipped: 20); {DAMAGED_SHARE:.0%} of the "
+        f"fruit are damaged, and the recipe changes every {BATCH} fruit. The records begin with {EARLIER} inspections, "
+        f"eight hours at that pace, which PostgreSQL gets first. The images' quota is {QUOTA_MB} MB, and "
+        f"{ACCEPTED_SHARE:.0%} of the passed fruit's are stored (shipped: 2 %): {removing}."
+    )
+    deciding = (
+        f"Nothing is decided over the warm-up, the first {WARM_UP_SHARE:.0%} ({after[0].at_s / 60:.0f} minutes). A "
+        "slope is the median of all pairs' (Theil, Sen), its interval widened by the series' own memory (Hamed, Rao). "
+        f"A verdict needs the whole interval on one side, and {DECIDES_S / 60:.0f} minutes; else it is *not decided*. "
+        "Memory is what no other process shares (USS)."
+    )
+    flat = (
+        f"Flat is less than {MOST_PIECES_PER_HOUR:g} more in an hour; of latency and times, less than "
+        f"{MOST_SHARE_PER_HOUR:.0%} of the median more. The twin is none of the station's processes."
+    )
+    images = (
+        f"- Images on the disk: at most {max(each.images_mb for each in after):.0f} MB after the warm-up; "
+        f"{last.counts.images_kept:.0f} images were stored, {last.counts.images_removed:.0f} of them removed. The "
+        f"database with its log: {after[0].database_mb:.1f} MB after the warm-up, {last.database_mb:.1f} MB at the end."
+    )
+    outbox = (
+        f"- Outbox: at most {max(each.counts.waiting for each in after):.0f} entries waited after the warm-up; "
+        f"inspections that PostgreSQL lacked at the end: {unsent}."
+    )
+    lines = [
+        "# Soak: what grows in a station that runs on",
+        "",
+        *textwrap.wrap(ran, WIDTH),
+        "",
+        *textwrap.wrap(worth, WIDTH),
+        "",
+        *textwrap.wrap(deciding, WIDTH),
+        undecided(samples),
+        *memory_table(samples),
+        "",
+        "![Memory, descriptors, latency and records over time](images/soak.svg)",
+        "",
+        *pieces_table(samples),
+        "",
+        *textwrap.wrap(flat, WIDTH),
+        "",
+        *timings_table(samples),
+        "",
+        f"- Decided: {decisions}.",
+        *textwrap.wrap(images, WIDTH, subsequent_indent="  "),
+        *textwrap.wrap(outbox, WIDTH, subsequent_indent="  "),
+        "",
+        *([FOUND, ""] if FOUND else []),
+        f"Machine: {os.cpu_count()} cores, load {load:.1f}, which twin, line, clients, databases and station share.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def draw(samples: Sequence[Sample], file: Path) -> None:
+    """Draw everything over time.
+
+    Args:
+        samples: at least one.
+        file: the SVG.
+    """
+    figure = Figure(figsize=(9, 9.5), layout="constrained")
+    memory, pieces, latency, disk = figure.subplots(4, 1, sharex=True)
+    after = settled(samples)
+    for name in present(samples):
+        every = of_process(samples, name, lambda each: each.unique_mb)
+        base = of_process(after, name, lambda each: each.unique_mb).values[0]
+        _line(memory, every._replace(values=[value - base for value in every.values]), dashed=name == TWIN)
+        _line(pieces, of_process(samples, name, lambda each: each.descriptors + each.threads), dashed=name == TWIN)
+    for each in timings(samples)[:2]:
+        _line(latency, each)
+    at_s = [each.at_s for each in samples]
+    _line(disk, Series("images", at_s, [each.images_mb for each in samples]))
+    _line(disk, Series("database", at_s, [each.database_mb for each in samples]))
+    memory.set_ylabel("MB since the warm-up")
+    memory.set_ylim(-10, 10)
+    pieces.set_ylabel("descriptors and threads")
+    latency.set_ylabel("µs")
+    latency.set_yscale("log")
+    disk.set_ylabel("MB of the records")
+    disk.set_xlabel("minutes since the first fruit")
+    for axes in (memory, pieces, latency, disk):
+        axes.axvspan(0, after[0].at_s / 60, color="#eeeeee", zorder=0)
+        axes.grid(color="#dddddd", linewidth=0.5)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
+    file.parent.mkdir(exist_ok=True)
+    with mpl.rc_context({"svg.hashsalt": "soak"}):
+        figure.savefig(file, metadata={"Date": None})
+
+
+def _line(axes: Axes, series: Series, *, dashed: bool = False) -> None:
+    axes.plot(
+        [at_s / 60 for at_s in series.at_s],
+        series.values,
+        label=series.name,
+        linewidth=1.0,
+        linestyle="--" if dashed else "-",
+        marker="." if len(series.values) == 1 else "",
+    )

@@ -1,0 +1,132 @@
+"""The soak's verdicts: what an interval decides, and what the page says of a station that grows or does not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.soak.slopes import Slope, Verdict, slope
+
+ROOT = Path(__file__).resolve().parents[2]
+WINDOWS = 270
+"""Of ten seconds: what an hour leaves after its warm-up."""
+AT_S = [10.0 * number for number in range(WINDOWS)]
+
+
+def remembering(seed, memory, deviation):
+    """Noise of which each value carries a share of the one before."""
+    noise = np.random.default_rng(seed).normal(0, deviation, WINDOWS)
+    for place in range(1, WINDOWS):
+        noise[place] += memory * noise[place - 1]
+    return noise
+
+
+def test_a_level_that_does_not_move_has_no_slope_at_all():
+    assert slope(AT_S, [41.0] * WINDOWS) == Slope(0.0, 0.0, 0.0)
+
+
+def test_too_few_points_have_no_slope():
+    assert slope(AT_S[:7], [1.0] * 7) is None
+
+
+@pytest.mark.parametrize(("mb_per_hour", "expected"), [(0.0, Verdict.YES), (0.5, Verdict.YES), (3.0, Verdict.NO)])
+def test_an_hour_decides_about_one_megabyte_an_hour(mb_per_hour, expected):
+    values = 100 + mb_per_hour * np.array(AT_S) / 3600 + remembering(1, 0.5, 0.1)
+    assert slope(AT_S, values).below(1.0) is expected
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.5, 0.9])
+def test_the_interval_holds_the_true_slope_as_often_as_it_promises_also_where_values_remember(memory):
+    found = [slope(AT_S, 2.0 * np.array(AT_S) / 3600 + remembering(seed, memory, 1.0)) for seed in range(50)]
+    # 47.5 of 50 are expected: fewer than 44 come of such an interval by chance once in 80 times; the seeds are fixed.
+    assert sum(each.low <= 2.0 <= each.high for each in found) >= 44
+
+
+@pytest.fixture
+def soak(monkeypatch):
+    """The modules, which import each other as the benchmarks' programs do."""
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    from benchmarks.soak import document, samples  # noqa: PLC0415
+
+    return document, samples
+
+
+def made(samples_module, leak_mb_per_hour=0.0, pid_after=None, windows=360, images_from=30):
+    """An hour's samples of a station whose service grows."""
+
+    def one(number):
+        at_s = 10.0 * (number + 1)
+        noise = 0.05 * (number * 7 % 5)
+        mb = {"service": 160 + noise + leak_mb_per_hour * at_s / 3600, "plc": 42.8}
+        pid = 7 if pid_after is None or number < pid_after else 8
+        processes = {name: samples_module.ProcessSample(pid, each, each + 20, 30, 6) for name, each in mb.items()}
+        removed = max(0, number - images_from)
+        counts = samples_module.StationCounts(4.0 * number, 0.1 * number, 8.0 * number, 9.0 * number, removed, 0)
+        latency = samples_module.Latency(200 + number % 7, 600 + number % 9, 900)
+        return samples_module.Sample(at_s, processes, latency, counts, 40.0, 9.0)
+
+    return [one(number) for number in range(windows)]
+
+
+def row(text, begins):
+    found = [line for line in text.splitlines() if line.startswith(f"| {begins} |")]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in found]
+
+
+def test_the_page_tells_a_process_that_grows_from_one_that_does_not(soak):
+    document, samples = soak
+    text = document.page(made(samples, leak_mb_per_hour=4.0), document.Ending({"PASS": 1436}, 0), 60, "", 1.0)
+    memory, pieces = row(text, "service")
+    assert memory[-2:] == ["no", "0"]
+    assert (pieces[3], pieces[6]) == ("yes", "yes")
+    assert row(text, "plc")[0][-2] == "yes"
+    assert "Not decided" not in text
+    assert "It was to run" not in text
+    assert "1436 fruit" in text
+
+
+@pytest.mark.parametrize("windows", [1, 9, 150])
+def test_a_short_run_decides_nothing_and_says_so(soak, windows):
+    document, samples = soak
+    ending = document.Ending({}, None)
+    text = document.page(made(samples, windows=windows), ending, 60, "", 1.0)
+    assert "**Not decided**" in text
+    assert "It was to run for 60 minutes" in " ".join(text.splitlines())
+    assert row(text, "service")[0][-2] == "not decided"
+
+
+def test_a_process_that_was_started_again_is_named_and_its_slope_is_that_of_the_new_one(soak):
+    document, samples = soak
+    grows_then_restarts = made(samples, leak_mb_per_hour=0.0, pid_after=200)
+    text = document.page(grows_then_restarts, document.Ending({}, 0), 60, "", 1.0)
+    assert row(text, "service")[0][-1] == "1"
+
+
+def test_an_error_that_ended_the_run_is_on_the_page(soak):
+    document, samples = soak
+    text = document.page(made(samples), document.Ending({}, None), 60, "the panels ended", 1.0)
+    assert "It ended early: the panels ended" in text
+
+
+def test_the_plot_is_drawn_from_one_sample_on(soak, tmp_path):
+    document, samples = soak
+    for number in (1, 40):
+        document.draw(made(samples)[:number], tmp_path / "images" / "soak.svg")
+        assert "<svg" in (tmp_path / "images" / "soak.svg").read_text()
+
+
+def test_counts_of_the_metrics_are_summed_over_their_labels(soak):
+    _, samples = soak
+    text = """# TYPE station_inspections_total counter
+station_inspections_total{fruit="strawberry",outcome="PASS",reason=""} 3
+station_inspections_total{fruit="raspberry",outcome="FAIL",reason="early_stop"} 2
+# TYPE station_records_images_total counter
+station_records_images_total{result="kept"} 20
+station_records_images_total{result="removed"} 12
+station_records_images_total{result="dropped"} 1
+# TYPE station_outbox_waiting gauge
+station_outbox_waiting{destination="mqtt"} 4
+station_outbox_waiting{destination="postgresql"} 5
+"""
+    found = samples.counts(text)
+    assert (found.fruit, found.images_kept, found.images_removed, found.waiting) == (5, 20, 12, 9)
