@@ -30,6 +30,9 @@ from station.settings.plc import HandshakeSettings
 
 OUTCOME_GRACE_S = 1.0
 """So much longer than the interface's own deadline an outcome is waited for: what it would have been is logged."""
+_NOTE_TRIES = 3
+"""A note that was refused may have been spoilt on its way; the station takes the same note again without effect."""
+_NOTE_AGAIN_S = 0.25
 
 log = logging.getLogger(__name__)
 
@@ -174,6 +177,7 @@ class StationLink:
 
     async def _note(self) -> None:
         """Send notes one after the other: an acknowledgement never overtakes its outcome."""
+        refused = 0
         while self._notes:
             action = self._notes[0]
             published = isinstance(action, do.NotifyPublished)
@@ -182,6 +186,10 @@ class StationLink:
                 await self._client.request(request, Noted, deadline_s=self._settings.station_lost_after_s)
             except RefusedError as error:
                 log.warning("the station did not take a note: %s", error)
+                refused += 1
+                if refused < _NOTE_TRIES:
+                    await asyncio.sleep(_NOTE_AGAIN_S)
+                    continue
             except ChannelError as error:
                 self._notes.clear()  # resynchronisation publishes final outcomes again
                 self._feed(ev.RequestFailed(now(), str(error)))
@@ -189,4 +197,5 @@ class StationLink:
             else:
                 if published:
                     self._feed(ev.OutcomeNoted(now(), action.outcome.sequence))
+            refused = 0
             self._notes.popleft()
