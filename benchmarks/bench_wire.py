@@ -13,7 +13,8 @@ import shutil
 import signal
 import sys
 import tempfile
-from collections.abc import AsyncIterator, Iterator
+import time
+from collections.abc import AsyncGenerator, Iterator
 from pathlib import Path
 
 import sections
@@ -33,16 +34,19 @@ TRIGGERS = 2000
 LIMIT_MM2 = 50.0
 """Between a sound and a bruised fruit of the twin, as in the kills."""
 _SCENARIO = Scenario(name="links", fault=None, expected=Expected(outcomes=("PASS",)))
-_END_S = 60.0
-"""A story that is interrupted ends its station within this time."""
+_END_S, _ASKED_AGAIN_S = 60.0, 10.0
+"""A story that is interrupted ends its station within this time; it is asked again as a cancellation may be lost."""
 
 
 async def play_here(seed: int, fruits: int) -> bool:
     """Play one story in a station of its own, and print each fruit; whether every law held."""
     place, routes, held = Path(tempfile.mkdtemp()), Routes(), True
     _end_by_sigterm()
-    async with running(place, _SCENARIO, "nest", LIMIT_MM2, routes) as rig:
-        async for each in play(rig, routes, seed, draw(seed, fruits)):
+    async with (
+        running(place, _SCENARIO, "nest", LIMIT_MM2, routes) as rig,
+        contextlib.aclosing(play(rig, routes, seed, draw(seed, fruits))) as playing,
+    ):
+        async for each in playing:
             held = held and not each.broken
             print(f"{type(each).__name__} {each.model_dump_json(exclude_defaults=True)}", flush=True)
     if held:
@@ -52,7 +56,7 @@ async def play_here(seed: int, fruits: int) -> bool:
     return held
 
 
-async def play_apart(seed: int, fruits: int) -> AsyncIterator[Story]:
+async def play_apart(seed: int, fruits: int) -> AsyncGenerator[Story, None]:
     """Play one story in a process of its own, as its proxies take much of a processor; yields it as it grows."""
     command = (sys.executable, __file__, "--story", str(seed), "--fruits", str(fruits))
     process = await asyncio.create_subprocess_exec(*command, stdout=asyncio.subprocess.PIPE, start_new_session=True)
@@ -71,11 +75,12 @@ async def play_apart(seed: int, fruits: int) -> AsyncIterator[Story]:
             why = f"the story's process ended with {process.returncode}"
             yield story.model_copy(update={"broken": ((ALARMS_RETURN, why),)})
     finally:
-        if process.returncode is None:
+        ends_s = time.monotonic() + _END_S
+        while process.returncode is None and time.monotonic() < ends_s:
             with contextlib.suppress(ProcessLookupError):
                 process.terminate()
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(_END_S):
+                async with asyncio.timeout(_ASKED_AGAIN_S):
                     await process.wait()
 
 
@@ -87,10 +92,11 @@ async def play_all(count: int, seed: int, stations: int, fruits: int) -> None:
 
     async def one_after_the_other(seeds: Iterator[int]) -> None:
         while sum(story.triggers for story in stories.values()) < count:
-            async for story in play_apart(next(seeds), fruits):
-                stories[story.seed] = story
-                kept.write(KEPT, list(stories.values()))
-                _show(story, sum(each.triggers for each in stories.values()), count)
+            async with contextlib.aclosing(play_apart(next(seeds), fruits)) as growing:
+                async for story in growing:
+                    stories[story.seed] = story
+                    kept.write(KEPT, list(stories.values()))
+                    _show(story, sum(each.triggers for each in stories.values()), count)
 
     await asyncio.gather(*(one_after_the_other(seeds) for _ in range(stations)))
 
@@ -121,7 +127,9 @@ def main() -> int:
     parser.add_argument("--story", type=int, metavar="SEED", help="play this one again, and keep nothing")
     asked = parser.parse_args()
     if asked.story is not None:
-        return 0 if asyncio.run(play_here(asked.story, asked.fruits)) else 1
+        with contextlib.suppress(asyncio.CancelledError):
+            return 0 if asyncio.run(play_here(asked.story, asked.fruits)) else 1
+        return 1
     with contextlib.suppress(KeyboardInterrupt, asyncio.CancelledError):
         asyncio.run(play_all(asked.count, asked.seed, asked.stations, asked.fruits))
     made = kept.read(KEPT)

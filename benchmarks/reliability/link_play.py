@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import random
 import time
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Sequence
 from typing import NamedTuple, Self
 
 from plc_interface.plc_simulator.program import Decision
@@ -19,8 +19,9 @@ from .proxy import Disturbance, Kind
 from .rig import Rig
 from .routes import LinkName, Routes
 
-_PATIENCE_S = 90.0
-_LOOK_S = 0.005
+_PATIENCE_S = 240.0
+"""The station's deadline for an inspection comes before, also with the patience of a busy machine."""
+_LOOK_S = 0.01
 _RECORDED_S = 10.0
 """Within this time after ready every outcome is acknowledged in the records."""
 _NORMAL_S = 30.0
@@ -281,7 +282,7 @@ class Player:
             row.remedies = (*row.remedies, remedy)
 
 
-async def play(rig: Rig, routes: Routes, seed: int, plans: Sequence[Plan]) -> AsyncIterator[Fruit | Story]:
+async def play(rig: Rig, routes: Routes, seed: int, plans: Sequence[Plan]) -> AsyncGenerator[Fruit | Story, None]:
     """Play a story: yields each fruit, and at the end the story without its fruits.
 
     Args:
