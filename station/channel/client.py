@@ -110,7 +110,8 @@ class ChannelClient:
         for task in (self._receiving, self._reconnecting):
             task.cancel()
         await asyncio.gather(self._receiving, self._reconnecting, return_exceptions=True)
-        self._socket.disable_monitor()
+        if not self._socket.closed:
+            self._socket.disable_monitor()
         self._monitor.close(linger=0)
         self._socket.close(linger=0)
         self._context.term()
