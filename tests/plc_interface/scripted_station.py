@@ -58,6 +58,8 @@ class ScriptedStation:
         self.command_gate.set()
         self.command_done = CommandDone(done=True, why=None)
         self.deaf = False
+        self.lost_waits = 0
+        """So many requests for an outcome to come get no answer, as if it had been lost on its way."""
         self.spoilt_notes = 0
         """So many notes to come are refused, as if they had been spoilt on their way."""
         self._task: asyncio.Task[None] | None = None
@@ -126,6 +128,9 @@ class ScriptedStation:
         return BeginReply(sequence=sequence, deadline_s=self.deadline_s)
 
     async def _await(self, request: AwaitOutcome) -> Outcome:
+        if self.lost_waits:
+            self.lost_waits -= 1
+            await asyncio.Event().wait()
         return await until(lambda: self.outcomes.get(request.sequence))
 
     def _spoil(self) -> None:

@@ -415,3 +415,17 @@ def test_a_note_that_is_spoilt_on_its_way_is_given_again(cell, eventually):
             await eventually(lambda: station.acknowledged == 101)
 
     asyncio.run(scenario())
+
+
+def test_an_outcome_whose_answer_is_lost_is_asked_for_again(cell):
+    async def scenario():
+        async with cell() as made:
+            station, plc = made.station, await made.plc()
+            await plc.arm("buffer_results")
+            station.lost_waits = 1
+            await plc.trigger(4711)
+            station.finish("PASS")
+            seen = await plc.wait("result_valid")
+            assert seen["result_outcome"] == "PASS"
+
+    asyncio.run(scenario())
