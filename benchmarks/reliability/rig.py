@@ -16,7 +16,7 @@ import urllib.request
 from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import psutil
 
@@ -37,10 +37,11 @@ from station.settings.configuration import Configuration, load_configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.recipe import load_recipes
 from station.supervision.programs import station_programs, twin_program
-from station.supervision.supervisor import Supervisor
+from station.supervision.supervisor import Program, Supervisor
 from station.twin.console import ask
 
 from .clock import CannotDoError, ShiftedClock
+from .routes import Routes
 from .scenario import ClockFault, DeviceFault, DiskFault, Fault, NestFault, Phase, PlcFault, ProcessFault, Scenario
 from .wire import Wire
 
@@ -72,9 +73,12 @@ class Rig:
         configuration: its own.
         file: of the configuration.
         console_port: of the twin.
+        plc_host: where the line's PLC finds the interface, if elsewhere than its own address.
     """
 
-    def __init__(self, configuration: Configuration, file: Path, console_port: int) -> None:
+    def __init__(
+        self, configuration: Configuration, file: Path, console_port: int, plc_host: str | None = None
+    ) -> None:
         self.configuration, self.records = configuration, configuration.home / "records"
         self._file, self._console = file, console_port
         self._ballast = self.records / "ballast"
@@ -82,7 +86,7 @@ class Rig:
         self._stopped: list[psutil.Process] = []
         self.recipe = load_recipes(configuration.recipes_folder)[FRUIT]
         modbus = configuration.modbus
-        scanner = Scanner(modbus.host, modbus.port, modbus.unit, WordOrder(modbus.word_order))
+        scanner = Scanner(plc_host or modbus.host, modbus.port, modbus.unit, WordOrder(modbus.word_order))
         self.wire = Wire(scanner, lambda: self.twin(do="remove"))
         self._watching: asyncio.subprocess.Process | None = None
         self._moving: asyncio.Task[bytes] | None = None
@@ -322,34 +326,44 @@ def _quick_recipes(folder: Path, measured: str, limit_mm2: float) -> Path:
     return folder
 
 
-@contextlib.asynccontextmanager
-async def running(
-    folder: Path,
-    scenario: Scenario,
-    placing: Literal["nest", "arm"] = "nest",
-    limit_mm2: float = 140.0,
-) -> AsyncIterator[Rig]:
-    """Start a station on addresses of its own, with the patience of a busy machine; it ends with the block.
+class _Files(NamedTuple):
+    """The configuration of each side."""
+
+    twin: Path
+    station: Path
+    plc: Path
+
+
+def _detoured(file: Path, values: dict[str, Any], host: str, channel: tuple[str, int]) -> _Files:
+    """Write a configuration for each side: the station finds every device, and the interface the station, at `host`."""
+    twin, plc = file.with_name("twin.yaml"), file.with_name("plc.yaml")
+    twin.write_text(json.dumps(values), encoding="utf-8")
+    gripper = {**values["gripper"], "urcap": {"host": host}}
+    camera = {**values["camera"], "twin": {**values["camera"]["twin"], "host": host}}
+    devices = {"arm": {**values["arm"], "host": host}, "gripper": gripper, "camera": camera}
+    for each, address in ((file, channel[0]), (plc, host)):
+        line = {"handshake": {"endpoint": f"tcp://{address}:{channel[1]}"}}
+        each.write_text(json.dumps({**values, **devices, **line}), encoding="utf-8")
+    return _Files(twin, file, plc)
+
+
+def _programs(files: _Files, console: int, logs: Path) -> list[Program]:
+    """The cell's processes, each by its own configuration."""
+    service, _, pages = station_programs(files.station, logs)
+    plc = station_programs(files.plc, logs)[1]
+    programs = [twin_program(files.twin, console, 1, logs), service, plc, pages]
+    return [replace(each, start_limit_s=_START_S) for each in programs]
+
+
+def _patient(host: str, camera: int, placing: str) -> dict[str, Any]:
+    """Devices and service with the patience of a busy machine.
 
     Args:
-        folder: an empty one.
-        scenario: what will be played; the station is prepared for it.
+        host: of the devices.
+        camera: its port.
         placing: the service's setting.
-        limit_mm2: the recipe's, of the contact area.
-
-    Raises:
-        CannotDoError: the fault's disk or clock cannot be had.
-        StationError: a process does not start.
     """
-    modbus, metrics, hmi, camera, console = _free_ports(5)
-    host = f"127.{96 + secrets.randbelow(16)}.{secrets.randbelow(250) + 1}.{secrets.randbelow(250) + 1}"
-    file = folder / "station.yaml"
-    values = {
-        "home": str(folder / "home"),
-        "recipes_folder": str(_quick_recipes(folder / "recipes", scenario.measured, limit_mm2)),
-        "modbus": {"port": modbus},
-        "metrics": {"port": metrics},
-        "hmi": {"port": hmi},
+    return {
         "arm": {
             "host": host,
             "frequency_hz": 125.0,
@@ -374,23 +388,64 @@ async def running(
             "placing": placing,
         },
     }
+
+
+@contextlib.asynccontextmanager
+async def running(
+    folder: Path,
+    scenario: Scenario,
+    placing: Literal["nest", "arm"] = "nest",
+    limit_mm2: float = 140.0,
+    routes: Routes | None = None,
+) -> AsyncIterator[Rig]:
+    """Start a station on addresses of its own, with the patience of a busy machine; it ends with the block.
+
+    Args:
+        folder: an empty one.
+        scenario: what will be played; the station is prepared for it.
+        placing: the service's setting.
+        limit_mm2: the recipe's, of the contact area.
+        routes: proxies that every link leads through; None for none.
+
+    Raises:
+        CannotDoError: the fault's disk or clock cannot be had.
+        StationError: a process does not start.
+    """
+    modbus, metrics, hmi, camera, console, line = _free_ports(6)
+    host = f"127.{96 + secrets.randbelow(16)}.{secrets.randbelow(250) + 1}.{secrets.randbelow(250) + 1}"
+    file = folder / "station.yaml"
+    values = {
+        "home": str(folder / "home"),
+        "recipes_folder": str(_quick_recipes(folder / "recipes", scenario.measured, limit_mm2)),
+        "modbus": {"port": modbus},
+        "metrics": {"port": metrics},
+        "hmi": {"port": hmi},
+        **_patient(host, camera, placing),
+    }
     file.write_text(json.dumps(values), encoding="utf-8")
-    configuration = load_configuration(file, {})
+    behind = configuration = load_configuration(file, {})
+    files = _Files(file, file, file)
+    if routes is not None:
+        files = _detoured(file, values, routes.host, (host, line))
+        configuration = load_configuration(file, {})
     logs = folder / "logs"
     logs.mkdir()
-    rig = Rig(configuration, file, console)
+    rig = Rig(configuration, file, console, None if routes is None else routes.host)
     environment = {**os.environ, "STATION_HOME": str(folder / "home"), "OMP_NUM_THREADS": "1"}
     if isinstance(scenario.fault, ClockFault):
         environment |= rig.clock.build()
-    programs = [twin_program(file, console, 1, logs), *station_programs(file, logs)]
-    supervisor = Supervisor([replace(each, start_limit_s=_START_S) for each in programs], environment)
+    programs = _programs(files, console, logs)
+    supervisor = Supervisor(programs, environment)
     ended, ready = asyncio.Event(), asyncio.Event()
     if isinstance(scenario.fault, DiskFault):
         await rig.mount_records()
     supervising = asyncio.create_task(supervisor.run(ready.set, ended), name="supervisor")
     waiting = asyncio.create_task(ready.wait())
     scanning: asyncio.Task[None] | None = None
+    through = contextlib.AsyncExitStack()
     try:
+        if routes is not None:
+            await through.enter_async_context(routes.opened(behind, (host, line)))
         await asyncio.wait([supervising, waiting], return_when=asyncio.FIRST_COMPLETED)
         if supervising.done():
             await supervising
@@ -408,4 +463,5 @@ async def running(
             await asyncio.gather(scanning, return_exceptions=True)
         ended.set()
         await asyncio.gather(supervising, return_exceptions=True)
+        await through.aclose()
         await rig.unmount_records()

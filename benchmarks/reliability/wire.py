@@ -45,6 +45,8 @@ class Wire:
         self.shown: dict[int, set[Shown]] = {}
         """Every result that could be read, by its sequence; one result is one entry."""
         self.passages: list[Passage] = []
+        self.lost_s = 0.0
+        """Monotonic time at which the PLC last missed the station."""
         self.alarms: set[AlarmId] = set()
         """Since the last `forget_alarms`."""
 
@@ -62,6 +64,11 @@ class Wire:
     def stale(self) -> int:
         """Results of a fruit that was no longer waited for."""
         return self._program.counters.stale
+
+    @property
+    def losses(self) -> int:
+        """Times that the PLC missed the station."""
+        return self._program.counters.losses
 
     @property
     def result_valid(self) -> bool:
@@ -129,9 +136,12 @@ class Wire:
         """Scan until `stop`; no cancellation, as an exchange in flight may swallow it."""
         async with self._scanner:
             while not self._stopping:
+                losses = self.losses
                 outputs = self._program.scan(
                     self._inputs, time.monotonic(), fruit_in_nest=self._fruit, recipe=0, encoder=7
                 )
+                if self.losses > losses:
+                    self.lost_s = time.monotonic()
                 if self._disturbed == "lost":
                     self._scanner.cut()
                     self._inputs = None

@@ -25,11 +25,16 @@ from station.channel.line import (
     Resume,
     StationState,
 )
-from station.channel.messages import ChannelError, RefusedError
+from station.channel.messages import ChannelError, DeadlineError, RefusedError
 from station.settings.plc import HandshakeSettings
 
 OUTCOME_GRACE_S = 1.0
 """So much longer than the interface's own deadline an outcome is waited for: what it would have been is logged."""
+_NOTE_TRIES = 3
+"""A note that was refused may have been spoilt on its way; the station takes the same note again without effect."""
+_NOTE_AGAIN_S = 0.25
+_ASK_AGAIN_S = 2.0
+"""An outcome is asked for again after so long without an answer; the station answers every one who waits."""
 
 log = logging.getLogger(__name__)
 
@@ -137,9 +142,8 @@ class StationLink:
             self._feed(ev.BeginAnswered(now(), action.number, begun))
 
     async def _outcome(self, action: do.RequestOutcome) -> None:
-        request = AwaitOutcome(sequence=action.sequence)
         try:
-            outcome = await self._client.request(request, Outcome, deadline_s=action.within_s + OUTCOME_GRACE_S)
+            outcome = await self._awaited(action.sequence, time.monotonic() + action.within_s + OUTCOME_GRACE_S)
         except ChannelError as error:
             self._forget_outcome(action.sequence)
             self._feed(ev.OutcomeFailed(now(), action.sequence, str(error)))
@@ -147,6 +151,18 @@ class StationLink:
             self._forget_outcome(action.sequence)
             self._feed(ev.OutcomeReceived(now(), outcome))
             self._beat_now.set()  # the station may be ready for the next trigger at once
+
+    async def _awaited(self, sequence: int, ends_s: float) -> Outcome:
+        """Ask for an outcome, again where no answer comes: a request or its answer may be lost on the way."""
+        while True:
+            left_s = max(0.0, ends_s - time.monotonic())
+            try:
+                return await self._client.request(
+                    AwaitOutcome(sequence=sequence), Outcome, deadline_s=min(_ASK_AGAIN_S, left_s)
+                )
+            except DeadlineError:
+                if left_s <= _ASK_AGAIN_S:
+                    raise
 
     def _forget_outcome(self, sequence: int) -> None:
         if self._outcomes.get(sequence) is asyncio.current_task():
@@ -174,6 +190,7 @@ class StationLink:
 
     async def _note(self) -> None:
         """Send notes one after the other: an acknowledgement never overtakes its outcome."""
+        refused = 0
         while self._notes:
             action = self._notes[0]
             published = isinstance(action, do.NotifyPublished)
@@ -182,6 +199,10 @@ class StationLink:
                 await self._client.request(request, Noted, deadline_s=self._settings.station_lost_after_s)
             except RefusedError as error:
                 log.warning("the station did not take a note: %s", error)
+                refused += 1
+                if refused < _NOTE_TRIES:
+                    await asyncio.sleep(_NOTE_AGAIN_S)
+                    continue
             except ChannelError as error:
                 self._notes.clear()  # resynchronisation publishes final outcomes again
                 self._feed(ev.RequestFailed(now(), str(error)))
@@ -189,4 +210,5 @@ class StationLink:
             else:
                 if published:
                     self._feed(ev.OutcomeNoted(now(), action.outcome.sequence))
+            refused = 0
             self._notes.popleft()

@@ -1,6 +1,7 @@
 """Client of a channel."""
 
 import asyncio
+import contextlib
 import itertools
 import time
 from typing import Self, TypeVar
@@ -8,6 +9,7 @@ from typing import Self, TypeVar
 import zmq
 import zmq.asyncio
 from pydantic import ValidationError
+from zmq.utils.monitor import parse_monitor_message
 
 from station.channel.messages import (
     ENVELOPE,
@@ -23,6 +25,11 @@ from station.messages.message import Message, verbatim
 
 ReplyT = TypeVar("ReplyT", bound=ChannelMessage)
 RECONNECT_MS = 10
+_PING_MS, _PONG_MS = 1000, 5000
+"""A connection whose server answers no ping within this time is made anew: where a length was spoilt on its way, the
+other side waits for bytes that never come. ZeroMQ answers by a thread of its own, also while a server works."""
+_RETRY_SHOWN_S = 0.5
+"""ZeroMQ announces within this time after a disconnection that it tries again; after a protocol error it never does."""
 
 
 class ChannelClient:
@@ -44,10 +51,15 @@ class ChannelClient:
         self._socket.setsockopt(zmq.LINGER, 0)
         self._socket.setsockopt(zmq.RECONNECT_IVL, RECONNECT_MS)
         self._socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_MESSAGE_BYTES)
-        self._socket.connect(check_endpoint(endpoint))
+        self._socket.setsockopt(zmq.HEARTBEAT_IVL, _PING_MS)
+        self._socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, _PONG_MS)
+        self._endpoint = check_endpoint(endpoint)
+        self._monitor = self._socket.get_monitor_socket(zmq.EVENT_DISCONNECTED | zmq.EVENT_CONNECT_RETRIED)
+        self._socket.connect(self._endpoint)
         self._numbers = itertools.count(1)
         self._waiting: dict[int, asyncio.Future[tuple[bytes, bytes]]] = {}
         self._receiving = asyncio.create_task(self._receive(), name=f"channel to {peer}")
+        self._reconnecting = asyncio.create_task(self._reconnect(), name=f"connection to {peer}")
 
     async def __aenter__(self) -> Self:
         return self
@@ -95,13 +107,31 @@ class ChannelClient:
 
     async def close(self) -> None:
         """Close the socket; pending requests end with a ChannelError. Idempotent."""
-        self._receiving.cancel()
-        await asyncio.gather(self._receiving, return_exceptions=True)
+        for task in (self._receiving, self._reconnecting):
+            task.cancel()
+        await asyncio.gather(self._receiving, self._reconnecting, return_exceptions=True)
+        if not self._socket.closed:
+            self._socket.disable_monitor()
+        self._monitor.close(linger=0)
         self._socket.close(linger=0)
         self._context.term()
         for answer in self._waiting.values():
             if not answer.done():
                 answer.set_exception(ChannelError(messages.CHANNEL_CLOSED(peer=self._peer)))
+
+    async def _reconnect(self) -> None:
+        """Connect again after a protocol error, as ZeroMQ gives such a connection up for ever."""
+        while True:
+            event = await _next_event(self._monitor)
+            while event == zmq.EVENT_DISCONNECTED:
+                try:
+                    async with asyncio.timeout(_RETRY_SHOWN_S):
+                        event = await _next_event(self._monitor)
+                except TimeoutError:
+                    with contextlib.suppress(zmq.ZMQError):
+                        self._socket.disconnect(self._endpoint)
+                    self._socket.connect(self._endpoint)
+                    break
 
     async def _receive(self) -> None:
         while True:
@@ -112,6 +142,12 @@ class ChannelClient:
             answer = self._waiting.get(number)
             if answer is not None and not answer.done():
                 answer.set_result((frames[1], frames[2]))
+
+
+async def _next_event(monitor: zmq.asyncio.Socket) -> int:
+    """Return the number of the monitor's next event."""
+    message = await monitor.recv_multipart()
+    return int(parse_monitor_message(message)["event"])
 
 
 def _why(body: bytes) -> Message:

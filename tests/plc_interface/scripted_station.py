@@ -24,6 +24,7 @@ from station.channel.line import (
     StationState,
 )
 from station.channel.server import ChannelServer
+from station.errors import BadInputError
 
 PATIENCE_S = 30.0
 
@@ -57,6 +58,10 @@ class ScriptedStation:
         self.command_gate.set()
         self.command_done = CommandDone(done=True, why=None)
         self.deaf = False
+        self.lost_waits = 0
+        """So many requests for an outcome to come get no answer, as if it had been lost on its way."""
+        self.spoilt_notes = 0
+        """So many notes to come are refused, as if they had been spoilt on their way."""
         self._task: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
@@ -123,15 +128,25 @@ class ScriptedStation:
         return BeginReply(sequence=sequence, deadline_s=self.deadline_s)
 
     async def _await(self, request: AwaitOutcome) -> Outcome:
+        if self.lost_waits:
+            self.lost_waits -= 1
+            await asyncio.Event().wait()
         return await until(lambda: self.outcomes.get(request.sequence))
 
+    def _spoil(self) -> None:
+        if self.spoilt_notes:
+            self.spoilt_notes -= 1
+            raise BadInputError("the note is malformed")
+
     async def _published(self, request: Published) -> Noted:
+        self._spoil()
         self.published[request.outcome.sequence] = request.outcome
         if self.running == request.outcome.sequence:
             self.running = None
         return Noted()
 
     async def _acknowledged(self, request: Acknowledged) -> Noted:
+        self._spoil()
         self.acknowledged = max(self.acknowledged, request.sequence)
         return Noted()
 

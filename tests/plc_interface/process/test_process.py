@@ -398,3 +398,34 @@ def test_the_end_is_orderly_and_a_second_interface_is_one_sentence(cell):
             assert await ending == 0
 
     asyncio.run(scenario())
+
+
+def test_a_note_that_is_spoilt_on_its_way_is_given_again(cell, eventually):
+    async def scenario():
+        async with cell() as made:
+            station, plc = made.station, await made.plc()
+            await plc.arm("buffer_results")
+            await plc.trigger(4711)
+            station.spoilt_notes = 1
+            station.finish("PASS")
+            await plc.wait("result_valid")
+            await eventually(lambda: 101 in station.published)
+            station.spoilt_notes = 1
+            await plc.write(acknowledged_sequence=101)
+            await eventually(lambda: station.acknowledged == 101)
+
+    asyncio.run(scenario())
+
+
+def test_an_outcome_whose_answer_is_lost_is_asked_for_again(cell):
+    async def scenario():
+        async with cell() as made:
+            station, plc = made.station, await made.plc()
+            await plc.arm("buffer_results")
+            station.lost_waits = 1
+            await plc.trigger(4711)
+            station.finish("PASS")
+            seen = await plc.wait("result_valid")
+            assert seen["result_outcome"] == "PASS"
+
+    asyncio.run(scenario())
