@@ -41,7 +41,8 @@ async def sweep(rig: MovingRig, recipe: Recipe, measure: Measure) -> Met:
     """Close from the present width without a stop until the newest frame shows a contact.
 
     The fingers wait for a measurement that is late, so that they are never more than `stop.MOST_UNSEEN_MM` and the way
-    of one reaction further than what was measured, or than where they began while nothing is measured yet.
+    of one reaction further than what was measured, or than where they began while nothing is measured yet. Where every
+    measurement is late, a frame of the waiting fingers is measured before they go on: so they get on all the same.
 
     Args:
         measure: gets one frame at a time.
@@ -53,7 +54,7 @@ async def sweep(rig: MovingRig, recipe: Recipe, measure: Measure) -> Met:
     unseen_s = stop.most_unseen_s(recipe)
     readings = [await _read(rig)]
     clear_mm: float | None = None
-    newer_than_s = time.monotonic()
+    newer_than_s = stopped_s = time.monotonic()
     # At once: the reference has just shown the gel free, and what touches it now shows within the way of one reaction.
     moving: asyncio.Future[Position] | None = asyncio.ensure_future(rig.close_to(stop.lowest_mm(recipe)))
     try:
@@ -66,7 +67,7 @@ async def sweep(rig: MovingRig, recipe: Recipe, measure: Measure) -> Met:
                 await asyncio.wait({seeing}, timeout=max(0.0, newer_than_s + unseen_s - time.monotonic()))
                 if not seeing.done() and moving is not None and not moving.done():
                     await rig.stop(moving)
-                    moving = None
+                    moving, stopped_s = None, time.monotonic()
                 seen = await seeing
             finally:
                 seeing.cancel()
@@ -78,7 +79,13 @@ async def sweep(rig: MovingRig, recipe: Recipe, measure: Measure) -> Met:
             if ended is not None:
                 raise stop.nothing_touched(recipe, ended.result())
             clear_mm, newer_than_s = seen.step.move.width_mm, seen.step.last_frame.captured_s
-            moving = moving or asyncio.ensure_future(rig.close_to(stop.lowest_mm(recipe)))
+            if moving is None:
+                waited, now_s = newer_than_s > stopped_s, time.monotonic()
+                if not waited and now_s > newer_than_s + unseen_s / 2:
+                    newer_than_s = stopped_s  # little or nothing of the unseen way is left since that frame
+                    continue
+                newer_than_s = now_s if waited else newer_than_s
+                moving = asyncio.ensure_future(rig.close_to(stop.lowest_mm(recipe)))
     finally:
         if moving is not None:
             moving.cancel()

@@ -183,6 +183,31 @@ def test_fingers_wait_for_a_measurement_that_is_late(cell, monkeypatch):
     asyncio.run(scenario())
 
 
+def test_fingers_get_on_where_every_measurement_is_late(cell):
+    async def scenario():
+        fingers, rig, _ = cell(14.0)
+        camera, measured = fingers.frame, 0
+
+        async def frame(newer_than_s: float, deadline_s: float) -> Frame:
+            for _ in range(5):  # it comes after the move has begun, and after a stop for which nothing is waited
+                await asyncio.sleep(0)
+            return await camera(newer_than_s, deadline_s)
+
+        async def late(step: Any) -> Any:
+            nonlocal measured
+            measured += 1
+            assert measured < 200, f"the fingers are at {fingers.width_at(fingers.now_s)} mm"
+            fingers.now_s += 0.2
+            await asyncio.sleep(0)
+            return cast("Any", SimpleNamespace(step=step, contact=SimpleNamespace(is_firm=step.move.width_mm < 14.0)))
+
+        fingers.frame = frame
+        met = await sweep(rig, BLUEBERRY, late)
+        assert met.width_mm < 14.0
+
+    asyncio.run(scenario())
+
+
 @pytest.mark.parametrize(("stopped_at_mm", "error"), [(14.0, UnseenContactError), (0.0, NothingTouchedError)])
 def test_fingers_that_end_their_way_without_a_contact_say_whether_something_held_them(cell, stopped_at_mm, error):
     async def scenario():
