@@ -19,7 +19,7 @@ from .proxy import Disturbance, Kind
 from .rig import Rig
 from .routes import LinkName, Routes
 
-_PATIENCE_S = 240.0
+_PATIENCE_S = 120.0
 """The station's deadline for an inspection comes before, also with the patience of a busy machine."""
 _LOOK_S = 0.01
 _RECORDED_S = 10.0
