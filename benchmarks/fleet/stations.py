@@ -1,4 +1,4 @@
-"""Whole stations side by side on one machine: each its twin, service, PLC interface and outbox, and a line of its own."""
+"""Whole stations side by side on one machine: each its twin, service, PLC interface, outbox and line."""
 
 import asyncio
 import dataclasses
@@ -22,9 +22,13 @@ from station.settings.recipe import load_recipes
 from station.supervision.programs import station_programs, twin_program
 from station.supervision.supervisor import Supervisor
 
+UNWANTED = (str(Decision.REFUSED), str(Decision.NO_ANSWER), "late")
+"""What no PLC may see."""
 KIND = "blueberry"
 """The quickest of the shipped recipes to decide."""
 DAMAGED_SHARE = 0.25
+ARM_HZ = 50
+"""Of each arm's state; 500 as in a cell would take the cores too."""
 SCAN_S = 0.05
 """Of each PLC; a scan of 10 ms, as one station's line has it, would take the cores that the stations need."""
 _START_LIMIT_S, _WATCHDOG_S = 300.0, 60.0
@@ -65,7 +69,7 @@ def prepare(folder: Path, number: int, host: str, ports: Sequence[int], postgres
         "home": str(folder / name),
         "modbus": {"port": modbus},
         "metrics": {"port": metrics},
-        "arm": {"host": host, "stale_after_s": 1.0, "link_lost_after_s": 5.0},
+        "arm": {"host": host, "frequency_hz": ARM_HZ, "stale_after_s": 1.0, "link_lost_after_s": 5.0},
         "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
         "camera": {"oldest_s": 2.0, "twin": {"port": camera}},
         "handshake": {"station_lost_after_s": 10.0, "begin_deadline_s": 5.0},
@@ -167,7 +171,7 @@ def disagreements(
     """
     wrong = []
     seen = at_plc(cell)
-    lost = {name: seen.pop(name) for name in (Decision.REFUSED, Decision.NO_ANSWER, "late") if seen[name]}
+    lost = {name: seen.pop(name) for name in UNWANTED if seen[name]}
     if lost:
         wrong.append(f"{cell.name}: the PLC saw {lost}")
     if len(cell.passages) != wanted:

@@ -23,8 +23,8 @@ _LOADERS = 2
 _PLAIN_LIMIT_S = 120
 
 _MAKE_LOTS = """
-INSERT INTO lots SELECT 'station-' || station, 'L' || lpad(lot::text, 5, '0'), 'grower ' || (lot * 7 + station) % {growers},
-    '{day}'::timestamptz, NULL, 1, 'bench', lot
+INSERT INTO lots SELECT 'station-' || station, 'L' || lpad(lot::text, 5, '0'),
+    'grower ' || (lot * 7 + station) % {growers}, '{day}'::timestamptz, NULL, 1, 'bench', lot
 FROM generate_series(1, {stations}) AS station, generate_series(0, {lots}) AS lot
 """
 # One day of all stations. Outcomes in the shares of benchmarks/archive/many.py; areas log-normal about a station's own
@@ -38,7 +38,9 @@ SELECT 'station-' || station, sequence, began, began + duration_ms * interval '1
     repeat(md5(fruit), 2), outcome,
     CASE outcome WHEN 'PASS' THEN '{{}}'::text[] WHEN 'FAIL' THEN
         CASE WHEN chance < 0.95 THEN '{{area_over_limit,early_stop}}'::text[] ELSE '{{area_over_limit}}' END
-    ELSE ARRAY[(ARRAY['no_contact', 'low_confidence', 'saturated', 'image_stale'])[1 + (chance * 1e6)::integer % 4]] END,
+    ELSE
+        ARRAY[(ARRAY['no_contact', 'low_confidence', 'saturated', 'image_stale'])[1 + (chance * 1e6)::integer % 4]]
+    END,
     outcome, '{{}}', false, false, false,
     CASE WHEN outcome <> 'NO_RESULT' THEN area_mm2 END, 40000, 4.0, 0.9, sequence % 65535 + 1, sequence * 100,
     'boot', '{curve}', '[]', 'not wanted', '{{"approach": 0.8, "steps": 2.1}}', '{{}}',
@@ -49,7 +51,9 @@ FROM (
         (2700 + 300 * random() + 20 * station)::bigint AS duration_ms,
         (ARRAY['strawberry', 'raspberry', 'blueberry'])[1 + number * 3 / {a_day}] AS fruit,
         CASE WHEN chance < 0.92 THEN 'PASS' WHEN chance < 0.98 THEN 'FAIL' ELSE 'NO_RESULT' END AS outcome,
-        (40 + station - 0.05 * {day_number}) * exp(0.25 * sqrt(-2 * ln(1 - random())) * cos(2 * pi() * random())) AS area_mm2
+        (40 + station - 0.05 * {day_number}) * exp(
+            0.25 * sqrt(-2 * ln(1 - random())) * cos(2 * pi() * random())
+        ) AS area_mm2
     FROM (
         SELECT station, number, {day_number}::bigint * {a_day} + number AS sequence, random() AS chance
         FROM generate_series(0, {a_day} - 1) AS number, generate_series(1, {stations}) AS station

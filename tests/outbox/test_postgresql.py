@@ -202,7 +202,9 @@ def test_a_database_of_version_1_is_refused_with_the_remedy_which_makes_it_as_a_
     try:
         with psycopg.connect(host=str(server.folder), user="fruit", dbname="old", autocommit=True) as old:
             new = [old.execute(query).fetchall() for query in FORM]
-            summaries = [old.execute(f"SELECT * FROM {name} ORDER BY 1, 2, 3, 4, 5, 6").fetchall() for name in SUMMARIES]
+            summaries = [
+                old.execute(f"SELECT * FROM {name} ORDER BY 1, 2, 3, 4, 5, 6").fetchall() for name in SUMMARIES
+            ]
             old.execute("DROP FUNCTION summarise_inspections() CASCADE; DROP FUNCTION bin_of")
             old.execute("DROP VIEW hourly_outcomes_of_growers, inspections_of_growers")
             old.execute("DROP TABLE hourly_outcomes, hourly_reasons, hourly_values")

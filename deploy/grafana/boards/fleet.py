@@ -20,7 +20,7 @@ COMPARED = (
     prom("lines", "Answers", "bool_yes_no", "0 is a machine that is off, or a network that is cut.", "reliability.md",
          (UP, "{{station}}"), largest=1),
     prom("lines", "Alarms", "short", "How many stand.", "alarms.md",
-         (f"sum by (station) (station_alarms_active{{{HERE}}})", "{{station}}")),
+         (f"sum by (station) (station_priority:alarms_active:sum{{{HERE}}})", "{{station}}")),
     prom("lines", "Throughput", "short", "Fruit a minute.", "cycle-time.md",
          (f"60 * sum by (station) (station_fruit_outcome:inspections:rate15m{{{HERE}}})", "{{station}}")),
     prom("lines", "Reject rate", "percentunit", "Over one hour. One station that differs from the others on the same "
