@@ -105,9 +105,8 @@ class Postgresql:
         found = await (await connection.execute("SELECT max(version) FROM schema_version")).fetchone()
         if found != (SCHEMA_VERSION,):
             version = found and found[0]
-            older = isinstance(version, int) and version < SCHEMA_VERSION
-            steps = [f"schema-{old}-to-{old + 1}.sql" for old in range(version, SCHEMA_VERSION)] if older else []
-            upgrade = " and then ".join(f"deploy/postgresql/{step}" for step in steps)
+            older = range(version, SCHEMA_VERSION) if isinstance(version, int) else ()
+            upgrade = " and then ".join(f"deploy/postgresql/schema-{old}-to-{old + 1}.sql" for old in older)
             remedy = messages.LOAD(file=upgrade) if older else messages.UPDATE_STATION()
             raise OutboxError(messages.OTHER_SCHEMA(found=str(version), expected=SCHEMA_VERSION), remedy)
         lock = "SELECT pg_try_advisory_lock(hashtextextended('fruit-station ' || %s, 0))"
