@@ -113,7 +113,7 @@ minute in all; slowed: the arm's state at {stations.ARM_HZ} Hz, PLC scans of {st
 | trigger to decision, s: median, most | {statistics.median(cycles_s):.1f}, {max(cycles_s):.1f} |
 | inspections in PostgreSQL | {sum(map(len, arrived.values()))} of {sum(map(len, own.values()))} recorded |
 | twice there, rows refused | {twice[0]}, {twice[1]} |
-| scrapes of Prometheus, every {SCRAPE} | {scrapes:.0f}, of {len(down)} stations one was not answered |
+| scrapes by Prometheus, every {SCRAPE} | {scrapes:.0f}; stations of which one was not answered: {len(down)} |
 | differences between PLC, records, PostgreSQL, Prometheus | {len(wrong)} |
 """
     return Part(text, wrong)

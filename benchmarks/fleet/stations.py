@@ -173,7 +173,8 @@ def disagreements(
     seen = at_plc(cell)
     lost = {name: seen.pop(name) for name in UNWANTED if seen[name]}
     if lost:
-        wrong.append(f"{cell.name}: the PLC saw {lost}")
+        why = [f"{each.decision}: {', '.join(each.reasons)}" for each in cell.passages if not each.sequence]
+        wrong.append(f"{cell.name}: the PLC saw {lost} {why}")
     if len(cell.passages) != wanted:
         wrong.append(f"{cell.name}: {len(cell.passages)} of {wanted} fruit decided")
     if seen != Counter(own.values()) or {each.sequence for each in cell.passages if each.sequence} != own.keys():

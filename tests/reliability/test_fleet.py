@@ -34,11 +34,11 @@ def test_books_that_agree_have_no_difference_and_each_other_one_is_named():
     assert "2 of 3 fruit decided" in said
     late = cell(Decision.PASS, Decision.FAIL)
     late.passages[1] = replace(late.passages[1], reasons=("late",))
-    assert stations.disagreements(late, own, arrived, counted, 2) == ["station-1: the PLC saw {'late': 1}"]
+    assert stations.disagreements(late, own, arrived, counted, 2) == ["station-1: the PLC saw {'late': 1} []"]
     refused = cell(Decision.PASS, Decision.FAIL, Decision.REFUSED)
-    refused.passages[2] = replace(refused.passages[2], sequence=0)
+    refused.passages[2] = replace(refused.passages[2], sequence=0, reasons=("not_ready",))
     (said,) = stations.disagreements(refused, own, arrived, counted, 3)
-    assert said == "station-1: the PLC saw {'refused': 1}"
+    assert said == "station-1: the PLC saw {'refused': 1} ['refused: not_ready']"
 
 
 def test_a_run_with_another_number_or_without_a_sample_differs():
