@@ -64,6 +64,7 @@ def sql(text: str, begin: str, end: str, **variables: list[str]) -> str:
         variables: the chosen values of each.
     """
     filled = re.sub(r"\$__timeFilter\((\w+)\)", rf"\1 BETWEEN '{begin}' AND '{end}'", text)
+    filled = filled.replace("$__timeFrom()", f"'{begin}'").replace("$__timeTo()", f"'{end}'")
     for name, values in variables.items():
         quoted = ",".join("'" + value.replace("'", "''") + "'" for value in values)
         filled = filled.replace(f"${{{name}:sqlstring}}", quoted)

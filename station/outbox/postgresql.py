@@ -18,7 +18,7 @@ from station.settings.outbox import OutboxPostgresqlSettings
 
 log = logging.getLogger(__name__)
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 NAME = "postgresql"
 _CONNECT_S = 5
 _STATEMENT_MS = 60_000
@@ -105,8 +105,8 @@ class Postgresql:
         found = await (await connection.execute("SELECT max(version) FROM schema_version")).fetchone()
         if found != (SCHEMA_VERSION,):
             version = found and found[0]
-            upgrade = f"deploy/postgresql/schema-{version}-to-{SCHEMA_VERSION}.sql"
-            older = isinstance(version, int) and version < SCHEMA_VERSION
+            older = range(version, SCHEMA_VERSION) if isinstance(version, int) else ()
+            upgrade = " and then ".join(f"deploy/postgresql/schema-{old}-to-{old + 1}.sql" for old in older)
             remedy = messages.LOAD(file=upgrade) if older else messages.UPDATE_STATION()
             raise OutboxError(messages.OTHER_SCHEMA(found=str(version), expected=SCHEMA_VERSION), remedy)
         lock = "SELECT pg_try_advisory_lock(hashtextextended('fruit-station ' || %s, 0))"

@@ -183,19 +183,31 @@ FORM = (
         "SELECT grantee, table_name, privilege_type FROM information_schema.role_table_grants "
         "WHERE table_schema = 'public' AND grantee LIKE 'fruit%' ORDER BY 1, 2, 3"
     ),
+    "SELECT event_object_table, trigger_name, event_manipulation FROM information_schema.triggers ORDER BY 1, 2, 3",
+    "SELECT proname, prosrc FROM pg_proc WHERE pronamespace = 'public'::regnamespace ORDER BY 1",
+    "SELECT indexdef FROM pg_indexes WHERE schemaname = 'public' ORDER BY 1",
     "SELECT version FROM schema_version",
 )
+SUMMARIES = ("hourly_outcomes", "hourly_reasons", "hourly_values")
 
 
-def test_a_database_of_version_1_is_refused_with_the_remedy_which_makes_it_as_a_new_one(server):
-    """Version 1 is the present one without the fruit's size."""
-    remedy = "deploy/postgresql/schema-1-to-2.sql"
+def test_a_database_of_version_1_is_refused_with_the_remedy_which_makes_it_as_a_new_one(server, fill, tmp_path):
+    """Version 1 is the present one without the fruit's size and the summaries by hour."""
+    folder = Path(__file__).resolve().parents[2]
+    steps = ("deploy/postgresql/schema-1-to-2.sql", "deploy/postgresql/schema-2-to-3.sql")
+    fill(tmp_path, 1, 1500, steps=0)
+    asyncio.run(tell_all(server, tmp_path, "upgraded"))
     with server.connect() as owner:
         owner.execute("CREATE DATABASE old TEMPLATE fruit")
     try:
         with psycopg.connect(host=str(server.folder), user="fruit", dbname="old", autocommit=True) as old:
             new = [old.execute(query).fetchall() for query in FORM]
-            old.execute("DROP VIEW inspections_of_growers")
+            summaries = [
+                old.execute(f"SELECT * FROM {name} ORDER BY 1, 2, 3, 4, 5, 6").fetchall() for name in SUMMARIES
+            ]
+            old.execute("DROP FUNCTION summarise_inspections() CASCADE; DROP FUNCTION bin_of")
+            old.execute("DROP VIEW hourly_outcomes_of_growers, inspections_of_growers")
+            old.execute("DROP TABLE hourly_outcomes, hourly_reasons, hourly_values")
             old.execute("ALTER TABLE inspections DROP COLUMN fruit_length_mm, DROP COLUMN size_class")
             old.execute(
                 "CREATE VIEW inspections_of_growers AS SELECT i.*, l.grower FROM inspections i "
@@ -207,14 +219,18 @@ def test_a_database_of_version_1_is_refused_with_the_remedy_which_makes_it_as_a_
                 async with Postgresql(settings(server, database="old"), "old").connected():
                     pass
 
-            with pytest.raises(OutboxError, match=f"the database's schema version is 1, not 2; load {remedy} there"):
+            with pytest.raises(OutboxError, match=f"version is 1, not 3; load {steps[0]} and then {steps[1]} there"):
                 asyncio.run(connect())
-            old.execute((Path(__file__).resolve().parents[2] / remedy).read_bytes())
+            for step in steps:
+                old.execute((folder / step).read_bytes())
             asyncio.run(connect())
             upgraded = [old.execute(query).fetchall() for query in FORM]
             assert upgraded == new
-            old.execute("UPDATE schema_version SET version = 3")
-            with pytest.raises(OutboxError, match="schema version is 3, not 2; bring this station to the version"):
+            assert [
+                old.execute(f"SELECT * FROM {name} ORDER BY 1, 2, 3, 4, 5, 6").fetchall() for name in SUMMARIES
+            ] == summaries
+            old.execute("UPDATE schema_version SET version = 4")
+            with pytest.raises(OutboxError, match="schema version is 4, not 3; bring this station to the version"):
                 asyncio.run(connect())
     finally:
         with server.connect() as owner:

@@ -14,15 +14,15 @@ ROWS = (
     prom("number", "Alarms", "short", "That stand now, by priority.", "alarms.md",
          (f"sum by (priority) (station_alarms_active{{{HERE}}})", "{{priority}}"), width=6),
     prom("number", "Fruit a minute", "short", "By all of them.", "cycle-time.md",
-         (f"60 * sum(station_fruit_outcome:inspections:rate15m{{{HERE}}})", "fruit"), width=6),
+         (f"60 * sum(station:inspections:rate15m{{{HERE}}})", "fruit"), width=6),
 )  # fmt: skip
 COMPARED = (
     prom("lines", "Answers", "bool_yes_no", "0 is a machine that is off, or a network that is cut.", "reliability.md",
          (UP, "{{station}}"), largest=1),
     prom("lines", "Alarms", "short", "How many stand.", "alarms.md",
-         (f"sum by (station) (station_alarms_active{{{HERE}}})", "{{station}}")),
+         (f"sum by (station) (station_priority:alarms_active:sum{{{HERE}}})", "{{station}}")),
     prom("lines", "Throughput", "short", "Fruit a minute.", "cycle-time.md",
-         (f"60 * sum by (station) (station_fruit_outcome:inspections:rate15m{{{HERE}}})", "{{station}}")),
+         (f"60 * station:inspections:rate15m{{{HERE}}}", "{{station}}")),
     prom("lines", "Reject rate", "percentunit", "Over one hour. One station that differs from the others on the same "
          "fruit measures differently: verify it.", "alarms.md#reject-rate",
          (f"station_fruit:reject_ratio:1h{{{HERE}}}", "{{station}}, {{fruit}}")),

@@ -5,54 +5,75 @@ from typing import Any
 
 from deploy.grafana.boards.panel import board, chosen, sql
 
-HERE = "$__timeFilter(began) AND station IN (${station:sqlstring}) AND fruit IN (${fruit:sqlstring})"
-FAILED = "count(*) FILTER (WHERE outcome = 'FAIL')::float / nullif(count(*) FILTER (WHERE outcome <> 'NO_RESULT'), 0)"
-UNJUDGED = "count(*) FILTER (WHERE outcome = 'NO_RESULT')::float / count(*)"
+BETWEEN = "hour BETWEEN date_trunc('hour', $__timeFrom()::timestamptz) AND $__timeTo()::timestamptz"
+HERE = f"{BETWEEN} AND station IN (${{station:sqlstring}}) AND fruit IN (${{fruit:sqlstring}}) AND inspections > 0"
+ALL = "sum(inspections)"
+FAILED = (
+    "coalesce(sum(inspections) FILTER (WHERE outcome = 'FAIL'), 0)::float "
+    "/ nullif(sum(inspections) FILTER (WHERE outcome <> 'NO_RESULT'), 0)"
+)
+UNJUDGED = f"coalesce(sum(inspections) FILTER (WHERE outcome = 'NO_RESULT'), 0)::float / {ALL}"
 GROWER = "coalesce(nullif(grower, ''), 'not told')"
 LOT = "coalesce(nullif(lot, ''), 'not told')"
+
+
+def median(quantity: str, metric: str, unit: float, name: str) -> str:
+    """Return a statement for the median by hour, interpolated in its bin of the summary, right to 2.5 %.
+
+    Args:
+        quantity: as `hourly_values` has it.
+        metric: column by which it is apart.
+        unit: of the quantity, in that of the panel.
+        name: of the value's column.
+    """
+    return f"""WITH binned AS (
+        SELECT hour, {metric}, bin, {ALL} AS here FROM hourly_values
+        WHERE quantity = '{quantity}' AND {HERE} GROUP BY 1, 2, 3
+        ), ranked AS (
+        SELECT *, sum(here) OVER (PARTITION BY hour, {metric} ORDER BY bin) AS up_to,
+        sum(here) OVER (PARTITION BY hour, {metric}) / 2 AS half FROM binned
+        )
+        SELECT hour AS time, {metric} AS metric,
+        power(1.05::float8, bin + (half - up_to + here) / here) * {unit} AS {name}
+        FROM ranked WHERE up_to - here < half AND up_to >= half ORDER BY 1"""
+
 
 LOTS = (
     sql("table", "Lots", "percentunit",
         "Each lot with its grower and what became of it; the newest on top. The lot's report is at the "
         "station: `station records report NAME lot.html`.", "records.md",
-        f"""SELECT {LOT} AS lot, {GROWER} AS grower, fruit, station, min(began) AS began, count(*)::text AS inspected,
-        {FAILED} AS failed, {UNJUDGED} AS "not judged"
-        FROM inspections_of_growers WHERE {HERE}
-        GROUP BY 1, 2, fruit, station ORDER BY min(began) DESC LIMIT 200""", width=24),
+        f"""SELECT {LOT} AS lot, {GROWER} AS grower, fruit, station, min(first_began) AS began,
+        {ALL}::text AS inspected, {FAILED} AS failed, {UNJUDGED} AS "not judged"
+        FROM hourly_outcomes_of_growers WHERE {HERE}
+        GROUP BY 1, 2, fruit, station ORDER BY min(first_began) DESC LIMIT 200""", width=24),
 )  # fmt: skip
 GROWERS = (
     sql("table", "Growers", "percentunit", "Who brings what, worst first.", "records.md",
-        f"""SELECT {GROWER} AS grower, fruit, count(*)::text AS inspected, {FAILED} AS failed
-        FROM inspections_of_growers WHERE {HERE}
+        f"""SELECT {GROWER} AS grower, fruit, {ALL}::text AS inspected, {FAILED} AS failed
+        FROM hourly_outcomes_of_growers WHERE {HERE}
         GROUP BY 1, fruit ORDER BY 4 DESC NULLS LAST""", width=12),
     sql("bars", "Failed by grower and day", "percentunit", "Share of the judged fruit.", "alarms.md#reject-rate",
-        f"""SELECT date_trunc('day', began) AS time, {GROWER} AS metric, {FAILED} AS failed
-        FROM inspections_of_growers WHERE {HERE} GROUP BY 1, 2 ORDER BY 1""", width=12),
+        f"""SELECT date_trunc('day', hour) AS time, {GROWER} AS metric, {FAILED} AS failed
+        FROM hourly_outcomes_of_growers WHERE {HERE} GROUP BY 1, 2 ORDER BY 1""", width=12),
 )  # fmt: skip
 TRENDS = (
     sql("bars", "Outcomes by day", "short", "How many fruit.", "records.md",
-        f"""SELECT date_trunc('day', began) AS time, outcome AS metric, count(*) AS fruit
-        FROM inspections WHERE {HERE} GROUP BY 1, 2 ORDER BY 1"""),
+        f"""SELECT date_trunc('day', hour) AS time, outcome AS metric, {ALL}::bigint AS fruit
+        FROM hourly_outcomes WHERE {HERE} GROUP BY 1, 2 ORDER BY 1"""),
     sql("lines", "Failed by fruit and hour", "percentunit", "Share of the judged fruit.", "alarms.md#reject-rate",
-        f"""SELECT date_trunc('hour', began) AS time, fruit AS metric, {FAILED} AS failed
-        FROM inspections WHERE {HERE} GROUP BY 1, 2 ORDER BY 1"""),
+        f"""SELECT hour AS time, fruit AS metric, {FAILED} AS failed
+        FROM hourly_outcomes WHERE {HERE} GROUP BY 1, 2 ORDER BY 1"""),
     sql("lines", "Contact area by hour", "suffix: mm²",
         "Median of the deciding area: a fruit that becomes softer with the season, or a gel that does.",
-        "measurement.md",
-        f"""SELECT date_trunc('hour', began) AS time, fruit AS metric,
-        percentile_cont(0.5) WITHIN GROUP (ORDER BY area_mm2) AS area
-        FROM inspections WHERE {HERE} AND area_mm2 IS NOT NULL GROUP BY 1, 2 ORDER BY 1"""),
+        "measurement.md", median("area_mm2", "fruit", 1.0, "area")),
     sql("table", "Reasons", "short", "Why fruit was diverted; a fruit can have several.", "alarms.md#many-no-result",
-        f"""SELECT reason, fruit, outcome, count(*) AS fruits
-        FROM inspections, unnest(reasons) AS reason WHERE {HERE} GROUP BY 1, 2, 3 ORDER BY 4 DESC"""),
+        f"""SELECT reason, fruit, outcome, {ALL}::bigint AS fruits
+        FROM hourly_reasons WHERE {HERE} GROUP BY 1, 2, 3 ORDER BY 4 DESC"""),
     sql("lines", "Inspections by hour", "s", "Median duration, to see when the line waits for the station.",
-        "cycle-time.md",
-        f"""SELECT date_trunc('hour', began) AS time, station AS metric,
-        percentile_cont(0.5) WITHIN GROUP (ORDER BY duration_ms) / 1000.0 AS seconds
-        FROM inspections WHERE {HERE} AND duration_ms IS NOT NULL GROUP BY 1, 2 ORDER BY 1"""),
+        "cycle-time.md", median("duration_ms", "station", 0.001, "seconds")),
     sql("table", "Recipes in use", "short", "By name and revision, with how many fruit.", "recipes.md",
-        f"""SELECT recipes.name, recipes.revision, left(recipes.sha256, 12) AS content, count(*) AS fruits
-        FROM inspections JOIN recipes ON recipes.sha256 = inspections.recipe_sha256 WHERE {HERE}
+        f"""SELECT recipes.name, recipes.revision, left(recipes.sha256, 12) AS content, {ALL}::bigint AS fruits
+        FROM hourly_outcomes JOIN recipes ON recipes.sha256 = hourly_outcomes.recipe_sha256 WHERE {HERE}
         GROUP BY 1, 2, 3 ORDER BY 4 DESC"""),
 )  # fmt: skip
 REPLICATION = (
@@ -72,7 +93,7 @@ def dashboard() -> Any:
     """The dashboard."""
     variables = (
         chosen("station", "Station", "SELECT DISTINCT station FROM stations ORDER BY 1", several=True),
-        chosen("fruit", "Fruit", "SELECT DISTINCT fruit FROM inspections WHERE fruit IS NOT NULL ORDER BY 1",
+        chosen("fruit", "Fruit", "SELECT DISTINCT fruit FROM hourly_outcomes WHERE fruit <> '' ORDER BY 1",
                several=True),
     )  # fmt: skip
     about = "Whose fruit is good, and what changes over the season?"

@@ -1,0 +1,104 @@
+"""The summaries by hour are at all times what the inspections themselves say, and the dashboard's answers too."""
+
+import asyncio
+
+import pytest
+
+from benchmarks.fleet import plain
+from benchmarks.fleet.year import equal
+from benchmarks.monitoring.asking import panels, sql
+from station.outbox.feed import read_batch
+from station.outbox.postgresql import Postgresql
+from station.settings.outbox import OutboxPostgresqlSettings
+
+MONTH = ("2026-01-01T00:00:00+00:00", "2026-01-31T23:59:59+00:00")
+EACH = {
+    "hourly_outcomes": (
+        "SELECT date_trunc('hour', began, 'UTC'), station, lot, coalesce(fruit, ''), coalesce(recipe_sha256, ''), "
+        "outcome, count(*), min(began) FROM inspections GROUP BY 1, 2, 3, 4, 5, 6"
+    ),
+    "hourly_reasons": (
+        "SELECT date_trunc('hour', began, 'UTC'), station, coalesce(fruit, ''), outcome, reason, count(*) "
+        "FROM inspections, unnest(reasons) AS reason GROUP BY 1, 2, 3, 4, 5"
+    ),
+    "hourly_values": (
+        "SELECT date_trunc('hour', began, 'UTC'), station, coalesce(fruit, ''), quantity, bin_of(value), count(*) "
+        "FROM inspections, LATERAL (VALUES ('area_mm2', area_mm2), ('duration_ms', duration_ms)) AS each "
+        "(quantity, value) WHERE value IS NOT NULL GROUP BY 1, 2, 3, 4, 5"
+    ),
+}
+
+
+def summaries(connection):
+    """What is stored, and what the inspections say."""
+    stored = {name: f"SELECT * FROM {name} WHERE inspections <> 0" for name in EACH}
+    return tuple(
+        {name: sorted(connection.execute(query).fetchall()) for name, query in queries.items()}
+        for queries in (stored, EACH)
+    )
+
+
+@pytest.fixture
+def told(server, fill, tmp_path):
+    """Two stations' inspections of two hours each, published by the outbox in batches."""
+
+    async def steps():
+        for number, station in enumerate(("summed-1", "summed-2")):
+            folder = tmp_path / station
+            fill(folder, 1, 2400 + 100 * number, steps=0)
+            settings = OutboxPostgresqlSettings(enabled=True, host=str(server.folder), user="fruit", tls="disable")
+            async with Postgresql(settings, station).connected() as session:
+                position = 0
+                while (batch := read_batch(folder, station, position)).up_to > position:
+                    await session.publish(batch)
+                    position = batch.up_to
+
+    asyncio.run(steps())
+    return server
+
+
+def test_summaries_follow_inserts_updates_and_deletes(told):
+    with told.connect() as connection:
+        stored, said = summaries(connection)
+        assert stored == said
+        assert all(stored.values())
+        connection.execute("UPDATE inspections SET images_state = 'removed' WHERE station = 'summed-1'")
+        assert summaries(connection) == (said, said)
+        connection.execute(
+            "UPDATE inspections SET outcome = 'FAIL', reasons = '{early_stop}', area_mm2 = 'NaN', duration_ms = 0, "
+            "fruit = NULL, recipe_sha256 = NULL WHERE station = 'summed-1' AND sequence % 3 = 0"
+        )
+        stored, said = summaries(connection)
+        for name in ("hourly_reasons", "hourly_values"):
+            assert stored[name] == said[name]
+        # a lot's first time is kept where the fruit that had it is counted elsewhere: it never changes at a station
+        assert [row[:-1] for row in stored["hourly_outcomes"]] == [row[:-1] for row in said["hourly_outcomes"]]
+        connection.execute("DELETE FROM inspections WHERE station = 'summed-1'")
+        stored, said = summaries(connection)
+        assert stored == said
+
+
+def test_a_published_inspection_that_is_published_again_is_counted_once(told):
+    with told.connect() as connection:
+        before = summaries(connection)
+        connection.execute(
+            "WITH again AS (SELECT * FROM inspections WHERE station = 'summed-2') "
+            "INSERT INTO inspections OVERRIDING USER VALUE SELECT * FROM again "
+            "ON CONFLICT (station, sequence, began) DO UPDATE SET entry = EXCLUDED.entry"
+        )
+        assert summaries(connection) == before
+
+
+def test_the_dashboard_answers_what_the_inspections_say(told):
+    queries = {panel.title: t["rawSql"] for panel in panels() for t in panel.targets if "rawSql" in t}
+    chosen = {"station": ["summed-1", "summed-2"], "fruit": ["strawberry", "raspberry"]}
+    titles = plain.STATEMENTS.keys() & queries.keys()
+    assert len(titles) == 9
+    with told.connect() as connection:
+        for title in sorted(titles):
+            ours, theirs = (
+                connection.execute(sql(text, *MONTH, **chosen).encode()).fetchall()
+                for text in (queries[title], plain.STATEMENTS[title])
+            )
+            assert theirs, title
+            assert equal(ours, theirs, plain.MEDIAN_TOLERANCE if title in plain.MEDIANS else 1e-9), title
