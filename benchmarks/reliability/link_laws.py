@@ -36,7 +36,9 @@ def of_records(records: Sequence[FullRecord], observer: Observer, deciding_mm: f
         observer: with all that was shown.
         deciding_mm: closing of the recipe's last limit.
     """
-    ids = [record.trigger.trigger_id for record in records]
+    # A trigger whose begin the interface missed was not accepted: the station closes it as NO_RESULT, which no PLC is
+    # shown, and the PLC triggers again.
+    ids = [record.trigger.trigger_id for record in records if not _withdrawn(record, observer)]
     for trigger_id in {each for each in ids if ids.count(each) > 1}:
         yield ONE_OUTCOME, f"trigger {trigger_id} was inspected {ids.count(trigger_id)} times"
     for record in records:
@@ -54,6 +56,11 @@ def of_records(records: Sequence[FullRecord], observer: Observer, deciding_mm: f
                 yield ONE_OUTCOME, f"{where} was shown as {outcome}, and is {standing.outcome}"
         if standing.outcome == "PASS" and not _whole(record, deciding_mm):
             yield WHOLE_PRESS, f"{where} is PASS without a whole curve that was judged so"
+
+
+def _withdrawn(record: FullRecord, observer: Observer) -> bool:
+    standing = record.standing
+    return record.sequence not in observer.shown and standing is not None and standing.outcome == "NO_RESULT"
 
 
 def _whole(record: FullRecord, deciding_mm: float) -> bool:

@@ -9,6 +9,7 @@ from typing import NamedTuple, Self
 
 from plc_interface.plc_simulator.program import Decision
 from station.inspection.alarm_table import AlarmId
+from station.inspection.alarms import CHATTER_S
 from station.records.model import FullRecord
 
 from .link_kept import ALARMS_RETURN, NONE_DOUBLED, NOTHING_MOVES, ONE_OUTCOME, Fruit, Story
@@ -24,8 +25,8 @@ _PATIENCE_S = 120.0
 _LOOK_S = 0.01
 _RECORDED_S = 10.0
 """Within this time after ready every outcome is acknowledged in the records."""
-_NORMAL_S = 30.0
-"""Within this time after the last fruit no alarm is active."""
+_NORMAL_S = CHATTER_S + 10.0
+"""Within this time after the last fruit no alarm is active: one that chatters stays until it was quiet for so long."""
 _PERSON_AFTER_S = 1.0
 """A person comes after so long in a state that waits for one."""
 _STILL_RAD, _STILL_MM = 1e-3, 0.1

@@ -47,6 +47,9 @@ def test_a_whole_inspection_breaks_nothing():
 def test_each_law_of_the_records_is_found():
     assert broken_by(replace(RECORD, acknowledged_utc_ms=None)) == [ONE_OUTCOME]
     assert broken_by(RECORD, replace(RECORD, sequence=6)) == [ONE_OUTCOME]
+    withdrawn = replace(RECORD, sequence=4, standing=OUTCOME.model_copy(update={"outcome": "NO_RESULT"}))
+    assert broken_by(withdrawn, RECORD) == []
+    assert broken_by(replace(withdrawn, sequence=5), RECORD) == [ONE_OUTCOME, ONE_OUTCOME]
     assert broken_by(RECORD, shown=(7, "FAIL", (), 38.0)) == [ONE_OUTCOME]
     assert broken_by(RECORD, shown=(8, "PASS", (), 38.0)) == [NONE_STALE]
     short = replace(JUDGED, curve=(CurvePoint(1, 20.0, 1.0, 38.0, 1, 0.9),))

@@ -2,13 +2,20 @@
 
 import asyncio
 import logging
+import time
 from collections.abc import Callable
 from dataclasses import replace
 
 from station.calibration.gate import gated
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import Frame
-from station.devices.gripper.errors import GripperLinkLostError, GripperSilentError, GripperTimeoutError
+from station.devices.gripper.errors import (
+    GripperLinkLostError,
+    GripperProtocolError,
+    GripperSilentError,
+    GripperTimeoutError,
+    GripperUnreachableError,
+)
 from station.inspection.alarm_table import AlarmId
 from station.inspection.centring import NOT_MOVED, Way, off_middle, too_far
 from station.inspection.cycle import REASONS, Event
@@ -32,6 +39,16 @@ from station.settings.configuration import Configuration
 from station.vocabulary import Reason
 
 log = logging.getLogger(__name__)
+
+_LET_GO_S, _LET_GO_AGAIN_S = 3.0, 0.2
+"""So long, and after such pauses, the jaws are opened again: most cuts of `./run bench wire` end within 1.5 s."""
+_WIRE_FAULTS = (
+    GripperLinkLostError,
+    GripperProtocolError,
+    GripperSilentError,
+    GripperTimeoutError,
+    GripperUnreachableError,
+)
 
 
 class Inspector:
@@ -351,14 +368,24 @@ class Inspector:
         carried = self._settings.placing == "arm" and self._devices.cell.arm is not None
         if carried:
             await self._rig(now).go("above_nest", "accept" if now.outcome_name == "PASS" else "reject")
-        width_mm = None if carried else self._width_around(now)
-        try:
-            await self._devices.cell.gripper.open(width_mm)
-        except (GripperSilentError, GripperLinkLostError, GripperTimeoutError):
-            # A lost answer says nothing of the jaws, and opening once more does no harm: only what then stays
-            # unknown needs a person.
-            await self._devices.cell.gripper.open(width_mm)
+        await self._let_go(None if carried else self._width_around(now))
         return Event.PLACED
+
+    async def _let_go(self, width_mm: float | None) -> None:
+        """Open, again for a time where the wire fails: its faults say nothing of the jaws, and opening does no harm.
+
+        Only what stays unknown needs a person.
+        """
+        until_s = time.monotonic() + _LET_GO_S
+        while True:
+            try:
+                await self._devices.cell.gripper.open(width_mm)
+            except _WIRE_FAULTS:
+                if time.monotonic() > until_s:
+                    raise
+                await asyncio.sleep(_LET_GO_AGAIN_S)
+            else:
+                return
 
     @staticmethod
     def close_as_no_result(now: Inspection, because: Event, why: Message | None) -> None:

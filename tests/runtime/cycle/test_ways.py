@@ -158,7 +158,7 @@ def test_an_outcome_that_the_disk_refuses_is_not_told_and_becomes_no_result_once
     asyncio.run(scenario())
 
 
-def test_an_answer_that_is_lost_as_the_fruit_is_let_go_is_asked_for_again(bench):
+def test_answers_that_are_lost_as_the_fruit_is_let_go_are_asked_for_again(bench):
     async def scenario():
         async with bench() as cell:
             await cell.choose("blueberry")
@@ -166,13 +166,13 @@ def test_an_answer_that_is_lost_as_the_fruit_is_let_go_is_asked_for_again(bench)
             gripper = cell.station.service._devices.cell.gripper
             status, lost = gripper.link.status, []
 
-            async def lose_one():
-                if not lost:
+            async def lose_some():
+                if len(lost) < 4:
                     lost.append(await status())
                     raise GripperSilentError(verbatim("the answer was lost"), verbatim("look at the network"))
                 return await status()
 
-            cell.at(State.PLACING_ACCEPT, lambda: setattr(gripper.link, "status", lose_one))
+            cell.at(State.PLACING_ACCEPT, lambda: setattr(gripper.link, "status", lose_some))
             assert (await cell.line.inspect()).outcome == "PASS"
             await cell.line.ready()
             assert lost
