@@ -53,7 +53,7 @@ ROOMS = {
     ),
     "recipes": Room(
         ("station.settings.recipe_model", "station.settings.damage", "station.settings.recipe"),
-        ("tests/settings/test_recipe.py",),
+        ("tests/settings/test_recipe.py", "tests/settings/test_export.py"),
     ),
 }  # fmt: skip
 """By the name on the command line."""

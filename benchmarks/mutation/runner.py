@@ -56,6 +56,11 @@ class Changed(NamedTuple):
     path: Path
     tree: ast.Module
 
+    @property
+    def function(self) -> str:
+        """Its function, or class, with the module."""
+        return f"{self.mutant.module}:{self.mutant.where}"
+
     def code(self) -> CodeType:
         """Apply the mutant, in this process for good, and return the module's code."""
         self.mutant.apply()
@@ -67,13 +72,27 @@ class Order:
 
     def __init__(self) -> None:
         self.took_s: dict[str, float] = {}
-        self.kills: Counter[str] = Counter()
+        self.kills: Counter[tuple[str, str]] = Counter()
+        """By the mutant's function and the test; under no function those of all."""
+        self.function: str = ""
+        """Of the mutant that is met."""
         self.failed: str = ""
+
+    def note_kill(self, function: str, test: str) -> None:
+        """Note that a test killed a mutant of a function."""
+        self.kills[function, test] += 1
+        self.kills["", test] += 1
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """Sort them."""
-        items.sort(key=lambda item: (-self.kills[item.nodeid], self.took_s.get(item.nodeid, 0.0)))
+        """Sort them: what killed mutants of the same function, then of any."""
+        items.sort(
+            key=lambda item: (
+                -self.kills[self.function, item.nodeid],
+                -self.kills["", item.nodeid],
+                self.took_s.get(item.nodeid, 0.0),
+            )
+        )
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Note how long it took, and whether it failed."""
@@ -235,13 +254,15 @@ def _side_by_side(
         while waiting and len(running) < _SIDE_BY_SIDE:
             place = waiting.pop()
             reading, writing = os.pipe()
+            order.function = todo[place].function
             child = _fork(lambda place=place, writing=writing: _limited(lambda: meet(todo[place]), order, writing))
             os.close(writing)
             running[child] = place, reading
         child, status = os.waitpid(-1, 0)
         place, reading = running.pop(child)
         with os.fdopen(reading) as pipe:
-            order.kills.update(pipe.read().splitlines())
+            for test in pipe.read().splitlines():
+                order.note_kill(todo[place].function, test)
         yield place, _fate(os.waitstatus_to_exitcode(status))
 
 
