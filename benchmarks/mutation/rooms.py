@@ -49,7 +49,7 @@ ROOMS = {
     ),
     "cycle": Room(
         ("station.inspection.cycle", "station.inspection.deadlines", "station.inspection.states"),
-        ("tests/inspection/test_cycle.py", "tests/inspection/test_deadlines.py"),
+        ("tests/inspection/test_cycle.py", "tests/inspection/test_deadlines.py", "tests/inspection/test_export.py"),
     ),
     "recipes": Room(
         ("station.settings.recipe_model", "station.settings.damage", "station.settings.recipe"),
