@@ -1,7 +1,8 @@
 """Runner of mutants: each in a forked process, with the room's own tests alone, the quickest killers first.
 
-First in a process that has collected the tests: a mutant of a function gets into it as the function's new code, which
-takes hundredths of a second. What lives there, and what changes a module's tables, is imported anew with its tests.
+A mutant of a function gets, as the function's new code, into a process that has collected the tests, which takes
+hundredths of a second. What changes a module's tables is imported anew with all that imports it, in a process that has
+imported everything else, which takes tenths.
 """
 
 import ast
@@ -16,7 +17,7 @@ import resource
 import signal
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from enum import StrEnum
 from pathlib import Path
 from types import CodeType, FrameType, FunctionType, ModuleType
@@ -33,6 +34,8 @@ _OURS = {"station", "plc_interface", "hmi", "tests", "benchmarks"}
 _SIDE_BY_SIDE = 2
 _LIMIT_S = 20
 """Of the processor's time: a mutant that takes more loops. One that waits is ended by the tests' own time-out."""
+_LIKELY = 2
+"""Tests that a module which is imported anew meets before all."""
 _EXAMPLES = 10
 """Of a property, always the same ones."""
 _PASSED, _FAILED, _NO_MODULE = 0, 1, 2
@@ -76,7 +79,8 @@ class Order:
         """By the mutant's function and the test; under no function those of all."""
         self.function: str = ""
         """Of the mutant that is met."""
-        self.failed: str = ""
+        self.killer: int | None = None
+        """Pipe of a process that meets a mutant: the first test that fails ends the process."""
 
     def note_kill(self, function: str, test: str) -> None:
         """Note that a test killed a mutant of a function."""
@@ -95,11 +99,12 @@ class Order:
         )
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Note how long it took, and whether it failed."""
+        """Note how long it took; where a mutant is met, end at the first that fails."""
         if report.when == "call":
             self.took_s[report.nodeid] = report.duration
-        if report.failed:
-            self.failed = report.nodeid
+        if report.failed and self.killer is not None:
+            os.write(self.killer, report.nodeid.encode())
+            os._exit(_FAILED)
 
 
 def fates(todo: Sequence[Changed], tests: Sequence[str]) -> Iterator[tuple[Mutant, Fate]]:
@@ -108,7 +113,7 @@ def fates(todo: Sequence[Changed], tests: Sequence[str]) -> Iterator[tuple[Mutan
     Raises:
         SystemExit: the tests fail without any mutant.
     """
-    order = _rehearse(tests)
+    order = _rehearse(tests, {each.mutant.module for each in todo})
     anew: list[Changed] = []
     for place, fate in _in_place(todo, tests, order):
         if fate is None:
@@ -119,14 +124,20 @@ def fates(todo: Sequence[Changed], tests: Sequence[str]) -> Iterator[tuple[Mutan
         yield anew[place].mutant, fate
 
 
-def _rehearse(tests: Sequence[str]) -> Order:
-    """Run the tests without a mutant, import the libraries that they need, and return in what order they are quick."""
+def _rehearse(tests: Sequence[str], mutated: Collection[str]) -> Order:
+    """Run the tests without a mutant, import what they need, and return in what order they are quick.
+
+    Args:
+        tests: of the room.
+        mutated: modules; they, and what imports them, are left for the processes that meet the mutants.
+    """
     reading, writing = os.pipe()
     order = Order()
 
     def note() -> int:
         ended = _pytest(tests, order)
-        names = [name for name in sys.modules if name.partition(".")[0] not in _OURS]
+        apart = _importers(mutated)
+        names = [name for name in sys.modules if name not in apart and name.partition(".")[0] != "tests"]
         with os.fdopen(writing, "w") as pipe:
             json.dump((names, order.took_s), pipe)
         return ended
@@ -142,6 +153,31 @@ def _rehearse(tests: Sequence[str]) -> Order:
             importlib.import_module(name)
     order.took_s.update(took_s)
     return order
+
+
+def _importers(modules: Collection[str]) -> set[str]:
+    """Return these modules, and all loaded ones of the project that import one of them, directly or through others."""
+    imports: dict[str, set[str]] = {}
+    for name, module in sys.modules.items():
+        path = getattr(module, "__file__", None)
+        if path and name.partition(".")[0] in _OURS:
+            imports[name] = {*_imported(ast.parse(Path(path).read_text(encoding="utf-8")))}
+    found = set(modules)
+    while more := {name for name, others in imports.items() if name not in found and others & found}:
+        found |= more
+    return found
+
+
+def _imported(tree: ast.Module) -> Iterator[str]:
+    for node in ast.walk(tree):
+        match node:
+            case ast.Import():
+                yield from (each.name for each in node.names)
+            case ast.ImportFrom(module=str() as module):
+                yield module
+                yield from (f"{module}.{each.name}" for each in node.names)
+            case _:
+                pass
 
 
 def _in_place(todo: Sequence[Changed], tests: Sequence[str], order: Order) -> Iterator[tuple[int, Fate | None]]:
@@ -197,8 +233,6 @@ def _meet(changed: Changed, session: pytest.Session, order: Order) -> int:
     order.pytest_collection_modifyitems(session.items)
     for item, following in zip(session.items, [*session.items[1:], None], strict=True):
         session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
-        if order.failed:
-            return _FAILED
     return _PASSED
 
 
@@ -241,6 +275,13 @@ def _import_and_meet(changed: Changed, tests: Sequence[str], order: Order) -> in
         importlib.import_module(module)
     except Exception:  # noqa: BLE001 (whatever the change made of it)
         return _NO_MODULE
+    # What killed others of the function, collected alone, which is quicker than all.
+    killers = sorted(order.kills, key=lambda kill: -order.kills[kill])
+    likely = [test for function, test in killers if function == order.function][:_LIKELY] or [
+        test for function, test in killers if not function
+    ][:_LIKELY]
+    if likely:
+        _pytest(likely, order)
     return _pytest(tests, order)
 
 
@@ -268,9 +309,8 @@ def _side_by_side(
 
 def _limited(meet: Callable[[], int], order: Order, killer: int) -> int:
     resource.setrlimit(resource.RLIMIT_CPU, (_LIMIT_S, _LIMIT_S + 5))
-    ended = meet()
-    os.write(killer, order.failed.encode())
-    return ended
+    order.killer = killer
+    return meet()
 
 
 def _fate(code: int) -> Fate:
@@ -287,7 +327,7 @@ def _pytest(tests: Sequence[str], *plugins: object) -> int:
         phases=(Phase.explicit, Phase.generate),
     )  # fmt: skip
     without = [f"-pno:{name}" for name in ("randomly", "cacheprovider", "xdist", "cov")]
-    options = ["-x", "-q", "--assert=plain", "--hypothesis-profile=mutation", *without]
+    options = ["-x", "-q", "--tb=no", "--assert=plain", "--hypothesis-profile=mutation", *without]
     return pytest.main([*options, *tests], list(plugins))
 
 

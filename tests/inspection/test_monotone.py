@@ -27,6 +27,16 @@ def test_noise_and_opening_again_are_not_wrong():
     assert wrong_frames([20, 19, 18, 19, 20], [0, 100, 200, 90, 0]) == []
 
 
+@pytest.mark.parametrize(("area", "wrong"), [(95.0, []), (94.9, [0])])
+def test_an_area_may_fall_by_a_twentieth(area, wrong):
+    assert [frame.index for frame in wrong_frames([20, 19], [100, area])] == wrong
+
+
+def test_no_fall_of_a_small_area_is_noise_by_itself():
+    assert [frame.index for frame in wrong_frames([20, 19], [0.5, 0.0])] == [0]
+    assert wrong_frames([20, 19], [0.5, 0.0], least_noise=0.5) == []
+
+
 @given(st.lists(st.floats(0, 1e5), min_size=1, max_size=25))
 def test_what_is_left_never_shrinks(areas):
     widths = [50.0 - step for step in range(len(areas))]

@@ -32,6 +32,8 @@ def test_the_budget_of_a_press():
     )
     assert budget.combined == pytest.approx(hypot(*(each.relative for each in budget.components)))
     assert budget.factor == pytest.approx(1.645, abs=0.001)
+    assert budget.expanded == pytest.approx(budget.factor * budget.combined)
+    assert budget.expanded_of("repeatability", "scale") == pytest.approx(budget.factor * hypot(0.03, 0.025))
     assert judge(FRUIT, RECIPE).areas[0].uncertainty_mm2 == pytest.approx(90 * 1.645 * budget.combined, rel=1e-3)
 
 
