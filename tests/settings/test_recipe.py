@@ -488,7 +488,11 @@ VALUES = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=3 * settings.default.max_examples, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=3 * settings.default.max_examples,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(data=st.data())
 def test_a_mutated_recipe_is_a_recipe_or_a_list_of_problems(small, data):
     lines = small.splitlines()
