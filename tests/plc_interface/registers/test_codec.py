@@ -92,6 +92,7 @@ def test_there_is_none_is_a_value_too(name, raw, order):
 
 
 def test_what_has_no_invalid_value_takes_none_of_it():
+    assert is_invalid(BY_NAME["trigger_id"], 0xFFFF) is False
     with pytest.raises(RegisterValueError, match="trigger_id has no invalid value"):
         encode(BY_NAME["trigger_id"], None)
 
