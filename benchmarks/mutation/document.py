@@ -6,9 +6,9 @@ from pathlib import Path
 
 from scipy.stats import binomtest
 
-from mutation.results import Outcome, equal
-from mutation.rooms import ROOMS
-from mutation.runner import Fate
+from .results import Outcome, equal
+from .rooms import ROOMS
+from .runner import Fate
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "mutation.md"
 

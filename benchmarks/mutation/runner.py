@@ -26,7 +26,7 @@ from typing import NamedTuple
 import pytest
 from hypothesis import Phase, settings
 
-from mutation.operators import Mutant
+from .operators import Mutant
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))  # the code that is changed is the code that the tests import
