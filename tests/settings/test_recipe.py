@@ -1,5 +1,6 @@
 """Recipes: what is wrong is said with file, line, field and what was expected; the shipped ones are good."""
 
+import json
 import re
 import shutil
 from pathlib import Path
@@ -11,7 +12,8 @@ from hypothesis import strategies as st
 from station.errors import BadInputError
 from station.messages import settings as messages
 from station.settings.problems import Problem, SettingsError
-from station.settings.recipe import Recipe, find_recipe, load_recipe, load_recipes
+from station.settings.recipe import Recipe, approved_by_distribution, find_recipe, load_recipe, load_recipes
+from station.settings.recipe_versions import content_sha256
 from station.settings.validation import validated
 from station.settings.yaml_loader import parse_document
 
@@ -412,6 +414,20 @@ class TestShipped:
         for recipe in load_recipes().values():
             assert recipe.segmentation.paper.model_fields_set == set(type(recipe.segmentation.paper).model_fields)
             assert recipe.segmentation.paper == type(recipe.segmentation.paper)()
+
+
+class TestApprovedByTheDistribution:
+    def test_each_shipped_recipe_by_the_hash_of_its_content(self, root):
+        approved = approved_by_distribution()
+        assert approved == json.loads((root / "recipes" / "approved.json").read_text())
+        assert approved == {name: content_sha256(recipe) for name, recipe in load_recipes().items()}
+
+    @pytest.mark.parametrize("content", [None, "", "{", "[]", "7"])
+    def test_none_without_a_list_that_can_be_read(self, tmp_path, monkeypatch, content):
+        if content is not None:
+            (tmp_path / "approved.json").write_text(content)
+        monkeypatch.setattr("station.settings.recipe.shipped_folder", lambda: tmp_path)
+        assert approved_by_distribution() == {}
 
 
 class TestFolders:
