@@ -22,6 +22,10 @@ def test_the_frame_that_falls_out_is_named_and_nothing_else(bad):
     assert not wrong.expected_low <= wrong.area <= wrong.expected_high
 
 
+def test_the_last_frames_are_named_where_they_fall_out():
+    assert [frame.index for frame in wrong_frames(WIDTHS, [0, 100, 220, 350, 20, 30])] == [4, 5]
+
+
 def test_noise_and_opening_again_are_not_wrong():
     assert wrong_frames(WIDTHS, [0, 100, 98, 350, 340, 640]) == []
     assert wrong_frames([20, 19, 18, 19, 20], [0, 100, 200, 90, 0]) == []
