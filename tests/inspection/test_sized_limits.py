@@ -178,6 +178,8 @@ def test_a_class_of_another_fruit_is_noticed_by_the_width():
 def test_without_a_size_the_recipe_says_what_is_done(judged_by, size):
     refused = judge(pressed(70, size), recipe_with(**{"from": judged_by}))
     assert (refused.outcome, refused.reasons) == ("NO_RESULT", (Reason.SIZE_UNKNOWN,))
+    missing = messages.NO_LENGTH() if judged_by == "length" else messages.NO_CLASS()
+    assert refused.findings[0].message == missing
     plain = recipe_with(without_size="plain_limit", **{"from": judged_by})
     assert judge(pressed(75, size), plain).outcome == "PASS"
     near = judge(pressed(90, size), plain)

@@ -27,6 +27,7 @@ FRUIT = Press(
 def test_the_budget_of_a_press():
     budget = judge(FRUIT, RECIPE).budget
     assert [each.name for each in budget.components] == list(COMPONENTS)
+    assert [each.unit for each in budget.components] == ["", "mm", "mm", "", ""]
     assert [each.relative for each in budget.components] == pytest.approx(
         [0.03, 0.4 / sqrt(12) / 3, 0.38 / sqrt(12) / 3, 2 * 0.0125, 0.8 * 0.6 / 40]
     )
