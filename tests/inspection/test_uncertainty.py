@@ -75,3 +75,6 @@ def test_the_repeatability_is_interpolated_and_held_beyond_its_ends():
     assert [repeatability_at(closing, measured) for closing in (1, 2, 3, 4, 9)] == pytest.approx(
         [0.1, 0.1, 0.08, 0.06, 0.06]
     )
+    longer = (*measured, Repeatability(closing_mm=6.0, relative=0.02))
+    assert [repeatability_at(closing, longer) for closing in (1, 5, 9)] == pytest.approx([0.1, 0.04, 0.02])
+    assert [repeatability_at(closing, measured[:1]) for closing in (1, 2, 9)] == [0.1, 0.1, 0.1]

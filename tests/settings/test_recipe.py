@@ -490,6 +490,17 @@ class TestFinding:
             "blueberry, raspberry, rubber_ball, strawberry (in "
         )
 
+    def test_a_name_unlike_any_is_given_no_hint(self):
+        with pytest.raises(
+            BadInputError, match=r"^recipe zzz: expected the path of a \.yaml file or one of blueberry, "
+        ):
+            find_recipe("zzz")
+
+    def test_what_holds_a_separator_is_a_path(self, small, write, tmp_path, monkeypatch):
+        write(small, "plain")
+        monkeypatch.chdir(tmp_path)
+        assert find_recipe("./plain").name == "cherry"
+
     def test_a_broken_neighbour_does_no_harm_and_is_named_where_it_may_be_the_one(self, small, write, tmp_path):
         write(small)
         broken = write("name: plum", "plum.yaml")
