@@ -199,7 +199,7 @@ def _in_place(todo: Sequence[Changed], tests: Sequence[str], order: Order) -> It
                 for place in others:
                     print(place, "-", file=pipe)
                 for place, fate in _side_by_side(apart, order, lambda each: _meet(each, session, order)):
-                    print(places[place], fate.name, file=pipe, flush=True)
+                    print(places[place], "-" if fate is Fate.NO_MODULE else fate.name, file=pipe, flush=True)
             return True
 
     def note(frame: FrameType, event: str, _argument: object) -> None:
@@ -229,21 +229,29 @@ def _is_called(changed: Changed, called: set[tuple[str, str]]) -> bool:
 
 
 def _meet(changed: Changed, session: pytest.Session, order: Order) -> int:
-    _put_in_place(changed.code(), changed.path)
+    if not _put_in_place(changed.code(), changed.path):
+        return _NO_MODULE
     order.pytest_collection_modifyitems(session.items)
     for item, following in zip(session.items, [*session.items[1:], None], strict=True):
         session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
     return _PASSED
 
 
-def _put_in_place(module: CodeType, path: Path) -> None:
-    """Give every function of a file its new code, wherever it is referred to."""
+def _put_in_place(module: CodeType, path: Path) -> bool:
+    """Give every function of a file its new code, wherever it is referred to.
+
+    Returns:
+        Whether one differs: a default value is no part of a function's code.
+    """
+    differs = False
     codes = {(code.co_qualname, code.co_firstlineno): code for code in _codes(module)}
     for each in gc.get_objects():
         if isinstance(each, FunctionType) and each.__code__.co_filename == str(path):
             code = codes[each.__code__.co_qualname, each.__code__.co_firstlineno]
             if code.co_freevars == each.__code__.co_freevars:
+                differs |= code != each.__code__
                 each.__code__ = code
+    return differs
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:

@@ -29,6 +29,7 @@ def test_the_last_frames_are_named_where_they_fall_out():
 def test_noise_and_opening_again_are_not_wrong():
     assert wrong_frames(WIDTHS, [0, 100, 98, 350, 340, 640]) == []
     assert wrong_frames([20, 19, 18, 19, 20], [0, 100, 200, 90, 0]) == []
+    assert wrong_frames([20, 19, 19], [0, 100, 50]) == []
 
 
 @pytest.mark.parametrize(("area", "wrong"), [(95.0, []), (94.9, [0])])
