@@ -37,6 +37,10 @@ def test_an_area_may_fall_by_a_twentieth(area, wrong):
     assert [frame.index for frame in wrong_frames([20, 19], [100, area])] == wrong
 
 
+def test_many_small_falls_are_no_noise_together():
+    assert [frame.index for frame in wrong_frames([20, 19, 18], [100, 96, 92])] == [2]
+
+
 def test_no_fall_of_a_small_area_is_noise_by_itself():
     assert [frame.index for frame in wrong_frames([20, 19], [0.5, 0.0])] == [0]
     assert wrong_frames([20, 19], [0.5, 0.0], least_noise=0.5) == []

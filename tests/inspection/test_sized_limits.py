@@ -155,7 +155,9 @@ def test_a_recipe_without_sizes_has_its_limits_as_written():
     del values["damage"]["size"]
     plain = Recipe.model_validate_json(json.dumps(values))
     for size in (NO_SIZE, FruitSize(6553.5, 9)):
-        assert sized_limits(pressed(80, size), plain) == SizedLimits(plain)
+        assert sized_limits(pressed(80, size), plain) == SizedLimits(
+            plain, factor=1.0, length_mm=None, relative_uncertainty=0.0, without_size=False, problem=None
+        )
 
 
 def test_a_length_a_little_outside_its_class_is_within_the_graders_uncertainty():

@@ -306,6 +306,12 @@ def test_the_very_first_sequence_is_acknowledged_by_its_number(bench):
     assert len(made.of(do.NotifyAcknowledged)) == 1
 
 
+def test_the_very_first_outcome_may_come_before_the_plc_has_written(bench):
+    made = bench()
+    made.link(Open(running=None, outcomes=(made.outcome(sequence=1),)))
+    assert [outcome.sequence for outcome in made.state.queue] == [1]
+
+
 def test_starts_and_resets_of_the_counters_wrap_round(bench):
     journal = bench(Journal(boots=2**16 - 1, epoch=2**32 - 1)).state.journal
     assert (journal.boots, journal.epoch) == (0, 0)
