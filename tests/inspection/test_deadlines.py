@@ -108,6 +108,12 @@ def test_a_motion_through_all_limits_without_a_stop_has_their_closing_for_its_wa
     assert phases_s[State.MOVING] == pytest.approx(1.0 + 3.0 * (3.0 / 20 + 0.2))
 
 
+def test_smaller_steps_take_less_each_and_are_more():
+    phases_s = deadlines(changed(step_mm=0.5), PACE).phases_s
+    assert phases_s[State.MOVING] == pytest.approx(1.0 + 3.0 * (0.5 / 20 + 0.2))
+    assert phases_s[State.CLOSING_TO_ONSET] == pytest.approx(1.0 + 3.0 * 63 * (0.225 + 0.035 + 0.1 + 0.05))
+
+
 ONSET_S = 0.2 + 4 * (0.2 + 0.05) + 3 / 30 + 0.1
 """Back to where nothing touches, four glances by one frame, then one by three."""
 PRESS_S = 3 * (0.05 + 0.2 + 0.035 + 0.1) + 2 * 0.05
@@ -127,6 +133,7 @@ FIRST_S = (1.5 + 0.2) + 5 / 30 + ((53 - 22 + 1) / 20 + 0.2) + ONSET_S + PRESS_S
         ({"attempts": 1, "centre_from_mm": None}, {"stroke_mm": 300.0}, FIRST_S + 1.5),
         ({"attempts": 1, "centre_from_mm": None, "number": 2}, {}, FIRST_S - 0.385),
         ({"attempts": 1, "centre_from_mm": None, "stop_when_decided": False}, {}, FIRST_S + 9 * 0.385),
+        ({"attempts": 1, "centre_from_mm": None, "step_mm": 0.5}, {}, FIRST_S - 0.5 / 20 + 6 * 0.36 - 3 * 0.385),
         ({"attempts": 1, "centre_from_mm": None}, {"measure_s": 1.0}, FIRST_S + 4 * 0.95 + 3 * 0.615 + 2 * 0.95),
     ],
 )
