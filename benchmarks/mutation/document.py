@@ -4,9 +4,11 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-from mutation.results import Outcome, equal
-from mutation.rooms import ROOMS
-from mutation.runner import Fate
+from scipy.stats import binomtest
+
+from .results import Outcome, equal
+from .rooms import ROOMS
+from .runner import Fate
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "mutation.md"
 
@@ -23,9 +25,14 @@ def page(known: Mapping[str, Outcome]) -> str:
         left = [each for each in outcome.alive if each not in reasons]
         killed = outcome.counts.get(Fate.KILLED, 0) + outcome.counts.get(Fate.LATE, 0)
         count = killed + len(outcome.alive)
+        unmet = outcome.counts.get(Fate.NO_MODULE, 0)
+        sampled = count + unmet < outcome.of
+        interval = binomtest(killed, count).proportion_ci(method="wilson")
+        shown = f"{100 * interval.low:.1f} to {100 * interval.high:.1f} %" if sampled else "all met"
         rows.append(
-            f"| {name} | {outcome.of:,} | {count:,} | {killed:,} | {len(same)} | {len(left)} "
-            f"| {100 * killed / count:.1f} % | {100 * killed / (count - len(same)):.1f} % | {outcome.commit} |"
+            f"| {name} | {outcome.of:,} | {unmet:,} | {count:,} | {killed:,} | {len(same)} | {len(left)} "
+            f"| {100 * killed / count:.1f} % | {shown} "
+            f"| {100 * killed / (count - len(same)):.1f} % | {outcome.commit} |"
         )
         if left:
             alive += ["", f"### {name}", "", *(f"- `{each}`" for each in left)]
@@ -40,12 +47,13 @@ def page(known: Mapping[str, Outcome]) -> str:
         "a number one more, a call, an argument or a row of a table left out. The room's own tests meet each mutant;",
         "one of them has to fail. Property tests take 10 examples, always the same ones, so a run can be repeated.",
         "",
-        "| room | mutants | met | killed | equal | alive | killed of all met | of those not equal | commit |",
-        "|---|---|---|---|---|---|---|---|---|",
+        ("| room | mutants | not importable | met | killed | equal | alive | killed of all met | 95 % interval "
+        "| of those not equal | commit |"),
+        f"|{'---|' * 11}",
         *rows,
         "",
-        "Where tests met fewer than there are, they were sampled evenly (`--every N`); one that cannot be imported",
-        "is met by none. *Equal* ones change nothing that anyone could see: each was",
+        "A mutant that cannot be imported is met by no test. Where the others were sampled evenly (`--every N`), the",
+        "interval is Wilson's for the share of all. *Equal* ones change nothing that anyone could see: each was",
         "examined, and is listed with its reason in `benchmarks/mutation/equal.toml`. Why a runner of our own:",
         "[decision 81](decisions/0081-mutation-testing-of-the-pure-rooms.md).",
         "",

@@ -2,7 +2,7 @@
 
 Relational, logical and arithmetic operators as in Offutt et al., "An experimental determination of sufficient mutant
 operators" (ACM TOSEM 5, 1996, 99), with left-out statements, arguments and table entries. Annotations, decorators,
-docstrings and texts for a person (strings with a space) are no behaviour, and stay.
+docstrings, `__all__` and texts for a person (strings with a space) are no behaviour, and stay.
 """
 
 import ast
@@ -109,7 +109,7 @@ def _changes(holder: ast.AST, where: str) -> Iterator[_Change]:
             inner = where
             if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
                 inner = f"{where}.{node.name}" if where else node.name
-            if isinstance(node, ast.If) and _is_main(node):
+            if (isinstance(node, ast.If) and _is_main(node)) or _is_all(node):
                 continue
             for new in _replacements(node):
                 yield inner, holder, field, place, node, new
@@ -125,6 +125,10 @@ def _is_docstring(node: ast.AST) -> bool:
 
 def _is_main(node: ast.If) -> bool:
     return "__main__" in ast.unparse(node.test)
+
+
+def _is_all(node: ast.AST) -> bool:
+    return isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
 
 
 def _may_be_left_out(holder: ast.AST, field: str, node: ast.AST, count: int, *, in_table: bool) -> bool:

@@ -49,11 +49,11 @@ ROOMS = {
     ),
     "cycle": Room(
         ("station.inspection.cycle", "station.inspection.deadlines", "station.inspection.states"),
-        ("tests/inspection/test_cycle.py", "tests/inspection/test_deadlines.py"),
+        ("tests/inspection/test_cycle.py", "tests/inspection/test_deadlines.py", "tests/inspection/test_export.py"),
     ),
     "recipes": Room(
         ("station.settings.recipe_model", "station.settings.damage", "station.settings.recipe"),
-        ("tests/settings/test_recipe.py",),
+        ("tests/settings/test_recipe.py", "tests/settings/test_export.py"),
     ),
 }  # fmt: skip
 """By the name on the command line."""

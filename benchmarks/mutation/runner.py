@@ -1,7 +1,8 @@
 """Runner of mutants: each in a forked process, with the room's own tests alone, the quickest killers first.
 
-First in a process that has collected the tests: a mutant of a function gets into it as the function's new code, which
-takes hundredths of a second. What lives there, and what changes a module's tables, is imported anew with its tests.
+A mutant of a function gets, as the function's new code, into a process that has collected the tests, which takes
+hundredths of a second. What changes a module's tables is imported anew with all that imports it, in a process that has
+imported everything else, which takes tenths.
 """
 
 import ast
@@ -16,7 +17,7 @@ import resource
 import signal
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from enum import StrEnum
 from pathlib import Path
 from types import CodeType, FrameType, FunctionType, ModuleType
@@ -25,7 +26,7 @@ from typing import NamedTuple
 import pytest
 from hypothesis import Phase, settings
 
-from mutation.operators import Mutant
+from .operators import Mutant
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))  # the code that is changed is the code that the tests import
@@ -33,6 +34,8 @@ _OURS = {"station", "plc_interface", "hmi", "tests", "benchmarks"}
 _SIDE_BY_SIDE = 2
 _LIMIT_S = 20
 """Of the processor's time: a mutant that takes more loops. One that waits is ended by the tests' own time-out."""
+_LIKELY = 2
+"""Tests that a module which is imported anew meets before all."""
 _EXAMPLES = 10
 """Of a property, always the same ones."""
 _PASSED, _FAILED, _NO_MODULE = 0, 1, 2
@@ -56,6 +59,11 @@ class Changed(NamedTuple):
     path: Path
     tree: ast.Module
 
+    @property
+    def function(self) -> str:
+        """Its function, or class, with the module."""
+        return f"{self.mutant.module}:{self.mutant.where}"
+
     def code(self) -> CodeType:
         """Apply the mutant, in this process for good, and return the module's code."""
         self.mutant.apply()
@@ -67,20 +75,36 @@ class Order:
 
     def __init__(self) -> None:
         self.took_s: dict[str, float] = {}
-        self.kills: Counter[str] = Counter()
-        self.failed: str = ""
+        self.kills: Counter[tuple[str, str]] = Counter()
+        """By the mutant's function and the test; under no function those of all."""
+        self.function: str = ""
+        """Of the mutant that is met."""
+        self.killer: int | None = None
+        """Pipe of a process that meets a mutant: the first test that fails ends the process."""
+
+    def note_kill(self, function: str, test: str) -> None:
+        """Note that a test killed a mutant of a function."""
+        self.kills[function, test] += 1
+        self.kills["", test] += 1
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """Sort them."""
-        items.sort(key=lambda item: (-self.kills[item.nodeid], self.took_s.get(item.nodeid, 0.0)))
+        """Sort them: what killed mutants of the same function, then of any."""
+        items.sort(
+            key=lambda item: (
+                -self.kills[self.function, item.nodeid],
+                -self.kills["", item.nodeid],
+                self.took_s.get(item.nodeid, 0.0),
+            )
+        )
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Note how long it took, and whether it failed."""
+        """Note how long it took; where a mutant is met, end at the first that fails."""
         if report.when == "call":
             self.took_s[report.nodeid] = report.duration
-        if report.failed:
-            self.failed = report.nodeid
+        if report.failed and self.killer is not None:
+            os.write(self.killer, report.nodeid.encode())
+            os._exit(_FAILED)
 
 
 def fates(todo: Sequence[Changed], tests: Sequence[str]) -> Iterator[tuple[Mutant, Fate]]:
@@ -89,7 +113,7 @@ def fates(todo: Sequence[Changed], tests: Sequence[str]) -> Iterator[tuple[Mutan
     Raises:
         SystemExit: the tests fail without any mutant.
     """
-    order = _rehearse(tests)
+    order = _rehearse(tests, {each.mutant.module for each in todo})
     anew: list[Changed] = []
     for place, fate in _in_place(todo, tests, order):
         if fate is None:
@@ -100,14 +124,20 @@ def fates(todo: Sequence[Changed], tests: Sequence[str]) -> Iterator[tuple[Mutan
         yield anew[place].mutant, fate
 
 
-def _rehearse(tests: Sequence[str]) -> Order:
-    """Run the tests without a mutant, import the libraries that they need, and return in what order they are quick."""
+def _rehearse(tests: Sequence[str], mutated: Collection[str]) -> Order:
+    """Run the tests without a mutant, import what they need, and return in what order they are quick.
+
+    Args:
+        tests: of the room.
+        mutated: modules; they, and what imports them, are left for the processes that meet the mutants.
+    """
     reading, writing = os.pipe()
     order = Order()
 
     def note() -> int:
         ended = _pytest(tests, order)
-        names = [name for name in sys.modules if name.partition(".")[0] not in _OURS]
+        apart = _importers(mutated)
+        names = [name for name in sys.modules if name not in apart and name.partition(".")[0] != "tests"]
         with os.fdopen(writing, "w") as pipe:
             json.dump((names, order.took_s), pipe)
         return ended
@@ -123,6 +153,31 @@ def _rehearse(tests: Sequence[str]) -> Order:
             importlib.import_module(name)
     order.took_s.update(took_s)
     return order
+
+
+def _importers(modules: Collection[str]) -> set[str]:
+    """Return these modules, and all loaded ones of the project that import one of them, directly or through others."""
+    imports: dict[str, set[str]] = {}
+    for name, module in sys.modules.items():
+        path = getattr(module, "__file__", None)
+        if path and name.partition(".")[0] in _OURS:
+            imports[name] = {*_imported(ast.parse(Path(path).read_text(encoding="utf-8")))}
+    found = set(modules)
+    while more := {name for name, others in imports.items() if name not in found and others & found}:
+        found |= more
+    return found
+
+
+def _imported(tree: ast.Module) -> Iterator[str]:
+    for node in ast.walk(tree):
+        match node:
+            case ast.Import():
+                yield from (each.name for each in node.names)
+            case ast.ImportFrom(module=str() as module):
+                yield module
+                yield from (f"{module}.{each.name}" for each in node.names)
+            case _:
+                pass
 
 
 def _in_place(todo: Sequence[Changed], tests: Sequence[str], order: Order) -> Iterator[tuple[int, Fate | None]]:
@@ -144,7 +199,7 @@ def _in_place(todo: Sequence[Changed], tests: Sequence[str], order: Order) -> It
                 for place in others:
                     print(place, "-", file=pipe)
                 for place, fate in _side_by_side(apart, order, lambda each: _meet(each, session, order)):
-                    print(places[place], fate.name, file=pipe, flush=True)
+                    print(places[place], "-" if fate is Fate.NO_MODULE else fate.name, file=pipe, flush=True)
             return True
 
     def note(frame: FrameType, event: str, _argument: object) -> None:
@@ -174,23 +229,29 @@ def _is_called(changed: Changed, called: set[tuple[str, str]]) -> bool:
 
 
 def _meet(changed: Changed, session: pytest.Session, order: Order) -> int:
-    _put_in_place(changed.code(), changed.path)
+    if not _put_in_place(changed.code(), changed.path):
+        return _NO_MODULE
     order.pytest_collection_modifyitems(session.items)
     for item, following in zip(session.items, [*session.items[1:], None], strict=True):
         session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
-        if order.failed:
-            return _FAILED
     return _PASSED
 
 
-def _put_in_place(module: CodeType, path: Path) -> None:
-    """Give every function of a file its new code, wherever it is referred to."""
+def _put_in_place(module: CodeType, path: Path) -> bool:
+    """Give every function of a file its new code, wherever it is referred to.
+
+    Returns:
+        Whether one differs: a default value is no part of a function's code.
+    """
+    differs = False
     codes = {(code.co_qualname, code.co_firstlineno): code for code in _codes(module)}
     for each in gc.get_objects():
         if isinstance(each, FunctionType) and each.__code__.co_filename == str(path):
             code = codes[each.__code__.co_qualname, each.__code__.co_firstlineno]
             if code.co_freevars == each.__code__.co_freevars:
+                differs |= code != each.__code__
                 each.__code__ = code
+    return differs
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:
@@ -222,6 +283,13 @@ def _import_and_meet(changed: Changed, tests: Sequence[str], order: Order) -> in
         importlib.import_module(module)
     except Exception:  # noqa: BLE001 (whatever the change made of it)
         return _NO_MODULE
+    # What killed others of the function, collected alone, which is quicker than all.
+    killers = sorted(order.kills, key=lambda kill: -order.kills[kill])
+    likely = [test for function, test in killers if function == order.function][:_LIKELY] or [
+        test for function, test in killers if not function
+    ][:_LIKELY]
+    if likely:
+        _pytest(likely, order)
     return _pytest(tests, order)
 
 
@@ -235,21 +303,22 @@ def _side_by_side(
         while waiting and len(running) < _SIDE_BY_SIDE:
             place = waiting.pop()
             reading, writing = os.pipe()
+            order.function = todo[place].function
             child = _fork(lambda place=place, writing=writing: _limited(lambda: meet(todo[place]), order, writing))
             os.close(writing)
             running[child] = place, reading
         child, status = os.waitpid(-1, 0)
         place, reading = running.pop(child)
         with os.fdopen(reading) as pipe:
-            order.kills.update(pipe.read().splitlines())
+            for test in pipe.read().splitlines():
+                order.note_kill(todo[place].function, test)
         yield place, _fate(os.waitstatus_to_exitcode(status))
 
 
 def _limited(meet: Callable[[], int], order: Order, killer: int) -> int:
     resource.setrlimit(resource.RLIMIT_CPU, (_LIMIT_S, _LIMIT_S + 5))
-    ended = meet()
-    os.write(killer, order.failed.encode())
-    return ended
+    order.killer = killer
+    return meet()
 
 
 def _fate(code: int) -> Fate:
@@ -266,7 +335,7 @@ def _pytest(tests: Sequence[str], *plugins: object) -> int:
         phases=(Phase.explicit, Phase.generate),
     )  # fmt: skip
     without = [f"-pno:{name}" for name in ("randomly", "cacheprovider", "xdist", "cov")]
-    options = ["-x", "-q", "--assert=plain", "--hypothesis-profile=mutation", *without]
+    options = ["-x", "-q", "--tb=no", "--assert=plain", "--hypothesis-profile=mutation", *without]
     return pytest.main([*options, *tests], list(plugins))
 
 

@@ -30,13 +30,8 @@ def step(before: State, event: Event, settings: HandshakeSettings) -> tuple[Stat
     apply_event(work)
     _run(work)
     state = work.state
-    changes = {
-        "queue": state.queue,
-        "running": state.running,
-        "asked_id": state.pending.trigger_id if state.pending else None,
-    }
-    if any(getattr(state.journal, name) != value for name, value in changes.items()):
-        work.update_journal(**changes)
+    asked_id = state.pending.trigger_id if state.pending else None
+    work.update_journal(queue=state.queue, running=state.running, asked_id=asked_id)
     if state.journal == before.journal:
         return state, tuple(work.actions)
     return state, (SaveJournal(state.journal, work.durable), *work.actions)

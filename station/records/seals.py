@@ -86,8 +86,8 @@ def note_skipped(connection: Connection, sequence: int) -> None:
 
 def append_skipped(connection: Connection, first: int, last: int) -> None:
     """Append a row that there is no inspection with these numbers."""
-    new = {"from": first, "to": last}
-    append_audit(connection, AuditEntry(STATION, STATION, SKIPPED, "records", new=new))
+    subject = f"{first}" if first == last else f"{first}-{last}"
+    append_audit(connection, AuditEntry(STATION, STATION, SKIPPED, subject, new={"from": first, "to": last}))
 
 
 def check_seals(connection: Connection) -> tuple[list[str], list[str]]:

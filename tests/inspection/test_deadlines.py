@@ -53,6 +53,96 @@ def test_the_strawberrys_deadline_covers_its_motions_and_no_hours():
     assert limits.phases_s[State.SETTLING] == pytest.approx(1.0 + 3 * settle_s)
 
 
+MOTION_S = {
+    State.APPROACHING: 4.0,
+    State.CENTRING: 0.5,
+    # From 53 mm down to 22 mm in steps of 1 mm, each with a motion, settling, three frames and a measurement.
+    State.CLOSING_TO_ONSET: 32 * (0.25 + 0.035 + 0.1 + 0.05),
+    State.MOVING: 0.25,
+    State.MOVING_MEASURING: 0.3,
+    State.SETTLING: 0.035,
+    State.SETTLING_MEASURING: 0.035,
+    State.REFERENCE: 5 / 30,
+    State.CAPTURING: 0.1,
+    State.CAPTURING_MEASURING: 0.1,
+    State.AWAITING_MEASURE: 0.05,
+    State.AWAITING_MEASURE_LAST: 0.05,
+    State.MEASURING_LAST: 0.05,
+    State.PLACING_ACCEPT: 3 * 2.0 + 2.85,
+    State.PLACING_REJECT: 3 * 2.0 + 2.85,
+    State.RECOVERING: 20.0,
+    **dict.fromkeys(
+        (State.RETREATING, State.RETREATING_READY, State.RETREATING_ACCEPTED, State.HOMING, State.HOMING_UNRECORDED),
+        4.0,
+    ),
+    **dict.fromkeys(
+        (State.OPENING_AGAIN, State.RELEASING, State.RESETTING, State.OPENING_HELD, State.OPENING_UNRECORDED), 2.85
+    ),
+    **dict.fromkeys((State.JUDGING, State.CHECKING), 0.0),
+}
+"""What each state takes by the strawberry's recipe where all is well; those not listed take a durable write."""
+
+
+def test_a_phase_has_three_times_what_it_takes_and_a_second():
+    phases_s = deadlines(RECIPE, PACE).phases_s
+    assert phases_s == pytest.approx({state: 1.0 + 3.0 * MOTION_S.get(state, 0.1) for state in phases_s})
+
+
+@pytest.mark.parametrize(
+    ("pace", "state", "takes_s"),
+    [
+        ({"arm_move_s": 1.0}, State.APPROACHING, 2.85),  # the jaws are slower than the arm
+        ({"arm_move_s": 1.0}, State.HOMING, 2.85),
+        ({"arm_move_s": 0.3}, State.CENTRING, 0.3),
+        ({"stroke_mm": 20.0}, State.CLOSING_TO_ONSET, 0.435),
+        ({"record_s": 0.4}, State.CLEARING, 0.4),
+    ],
+)
+def test_a_phase_takes_as_long_as_the_slowest_of_what_it_waits_for(pace, state, takes_s):
+    limits = deadlines(RECIPE, PACE._replace(**pace))
+    assert limits.phases_s[state] == pytest.approx(1.0 + 3.0 * takes_s)
+
+
+def test_a_motion_through_all_limits_without_a_stop_has_their_closing_for_its_way():
+    phases_s = deadlines(changed(measured="while_closing"), PACE).phases_s
+    assert phases_s[State.MOVING] == pytest.approx(1.0 + 3.0 * (3.0 / 20 + 0.2))
+
+
+def test_smaller_steps_take_less_each_and_are_more():
+    phases_s = deadlines(changed(step_mm=0.5), PACE).phases_s
+    assert phases_s[State.MOVING] == pytest.approx(1.0 + 3.0 * (0.5 / 20 + 0.2))
+    assert phases_s[State.CLOSING_TO_ONSET] == pytest.approx(1.0 + 3.0 * 63 * (0.225 + 0.035 + 0.1 + 0.05))
+
+
+ONSET_S = 0.2 + 4 * (0.2 + 0.05) + 3 / 30 + 0.1
+"""Back to where nothing touches, four glances by one frame, then one by three."""
+PRESS_S = 3 * (0.05 + 0.2 + 0.035 + 0.1) + 2 * 0.05
+AGAIN_S = 2 * (FREED_BY_MM / 20 + 0.2) + ONSET_S
+FIRST_S = (1.5 + 0.2) + 5 / 30 + ((53 - 22 + 1) / 20 + 0.2) + ONSET_S + PRESS_S
+
+
+@pytest.mark.parametrize(
+    ("recipe", "pace", "takes_s"),
+    [
+        ({"attempts": 1, "centre_from_mm": None}, {}, FIRST_S),
+        ({"attempts": 2, "centre_from_mm": None}, {}, FIRST_S + AGAIN_S + 0.5 + PRESS_S),
+        ({"attempts": 1}, {}, FIRST_S + AGAIN_S + 0.5),
+        ({}, {}, FIRST_S + 2 * (AGAIN_S + 0.5) + PRESS_S),
+        ({}, {"arm_way_s": 0.0}, FIRST_S - 1.5 + 0.53 + AGAIN_S + PRESS_S),
+        ({"attempts": 1, "centre_from_mm": None}, {"stroke_mm": 85.0}, FIRST_S),
+        ({"attempts": 1, "centre_from_mm": None}, {"stroke_mm": 300.0}, FIRST_S + 1.5),
+        ({"attempts": 1, "centre_from_mm": None, "number": 2}, {}, FIRST_S - 0.385),
+        ({"attempts": 1, "centre_from_mm": None, "stop_when_decided": False}, {}, FIRST_S + 9 * 0.385),
+        ({"attempts": 1, "centre_from_mm": None, "step_mm": 0.5}, {}, FIRST_S - 0.5 / 20 + 6 * 0.36 - 3 * 0.385),
+        ({"attempts": 1, "centre_from_mm": None}, {"measure_s": 1.0}, FIRST_S + 4 * 0.95 + 3 * 0.615 + 2 * 0.95),
+    ],
+)
+def test_the_longest_path_is_the_sum_of_what_a_fruit_goes_through(recipe, pace, takes_s):
+    limits = deadlines(changed(**recipe), PACE._replace(**pace))
+    assert limits.longest_path_s == pytest.approx(takes_s)
+    assert limits.inspection_s == pytest.approx(1.0 + 1.5 * takes_s)
+
+
 def test_a_recipe_that_takes_the_whole_curve_has_the_time_for_it():
     decided, whole = (deadlines(changed(stop_when_decided=stops), PACE).longest_path_s for stops in (True, False))
     assert whole - decided > 2 * (RECIPE.steps.number - 3) * (1 / 20 + RECIPE.imaging.settle_s + 3 / 30)
@@ -96,6 +186,7 @@ def test_late_names_what_was_waited_for_and_the_inspection_first():
     limits = deadlines(RECIPE, PACE)
     allowed = limits.phases_s[State.MOVING]
     assert late(limits, State.MOVING, allowed, 1.0) is None
+    assert late(limits, State.MOVING, allowed, limits.inspection_s) is None
     slow = late(limits, State.MOVING, allowed + 0.1, 1.0)
     assert slow is not None
     assert (slow.event, slow.state, slow.allowed_s) == (Event.GRIPPER_FAULT, State.MOVING, allowed)

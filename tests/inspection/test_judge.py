@@ -257,6 +257,13 @@ def test_an_onset_seen_too_soon_does_not_make_a_soft_fruit_pass():
     assert verdict.findings[0].message.parameters["begins_mm"] == pytest.approx(2.0, abs=0.05)
 
 
+@pytest.mark.parametrize(("begins_mm", "late"), [(1.0, False), (1.1, True)])
+def test_a_curve_may_begin_a_quarter_of_the_first_limits_closing_after_the_onset(begins_mm, late):
+    press = Press(37.0, 0.4, tuple(point(float(c), max(0.0, 30.0 * (c - begins_mm))) for c in range(7)))
+    findings = [finding.message.id for finding in judge(press, STRAWBERRY).findings]
+    assert (messages.LATE_ONSET.id in findings) is late
+
+
 def test_nothing_touched_and_a_wrong_fruit():
     nothing = judge(Press(None, 0.0, ()), STRAWBERRY)
     assert (nothing.outcome, nothing.reasons, nothing.deciding) == ("NO_RESULT", (Reason.NO_CONTACT,), None)
@@ -433,21 +440,41 @@ def test_both_passes_and_fails_are_drawn():
     assert outcomes == {"PASS", "NO_RESULT", "FAIL"}
 
 
-def test_what_cannot_pass_any_more_is_not_pressed_on():
-    threshold = STRAWBERRY.damage.area[0].model_copy(update={"least_area_mm2": 60.0})
+def with_least_area(least_mm2: float) -> Recipe:
+    """The strawberry's, with a least area at its limit."""
+    threshold = STRAWBERRY.damage.area[0].model_copy(update={"least_area_mm2": least_mm2})
     damage = STRAWBERRY.damage.model_copy(update={"area": (threshold,)})
-    recipe = STRAWBERRY.model_copy(update={"damage": damage})
+    return STRAWBERRY.model_copy(update={"damage": damage})
 
-    def stopped(area_mm2: float, *flags: Flag) -> list[bool]:
-        points = [point(float(closing), area_mm2 * closing / 4, *flags) for closing in range(6)]
-        return [early_stop(Press(35.0, 0.4, tuple(points[: n + 1])), recipe) is not None for n in range(6)]
 
-    assert stopped(100) == [False] * 6
-    assert stopped(55) == [False] * 4 + [True] * 2, "less than any fruit's"
-    assert stopped(100, Flag.LOW_CONFIDENCE) == [False] * 4 + [True] * 2
-    small = judge(Press(35.0, 0.4, tuple(point(float(c), 55 * c / 4) for c in range(6))), recipe)
+def growing_to(area_mm2: float, *flags: Flag) -> Press:
+    """A press up to 5 mm that shows this area at 4 mm."""
+    return Press(35.0, 0.4, tuple(point(float(closing), area_mm2 * closing / 4, *flags) for closing in range(6)))
+
+
+def stopped(press: Press, recipe: Recipe) -> list[bool]:
+    """Whether the steps end, after each point."""
+    return [
+        early_stop(replace(press, points=press.points[:number]), recipe) is not None
+        for number in range(1, len(press.points) + 1)
+    ]
+
+
+def test_what_cannot_pass_any_more_is_not_pressed_on():
+    recipe = with_least_area(60.0)
+    assert stopped(growing_to(100), recipe) == [False] * 6
+    assert stopped(growing_to(55), recipe) == [False] * 4 + [True] * 2, "less than any fruit's"
+    assert stopped(growing_to(100, Flag.LOW_CONFIDENCE), recipe) == [False] * 4 + [True] * 2
+    small = judge(growing_to(55), recipe)
     assert small.outcome == "NO_RESULT"
     assert Reason.LOW_CONFIDENCE in small.reasons
+
+
+def test_an_area_as_large_as_the_least_with_its_uncertainty_is_pressed_on():
+    area = next(each for each in judge(growing_to(70), STRAWBERRY).areas if each.closing_mm == 4)
+    assert area.area_mm2 is not None
+    assert area.uncertainty_mm2 is not None
+    assert stopped(growing_to(70), with_least_area(area.area_mm2 - area.uncertainty_mm2)) == [False] * 6
 
 
 DECIDING = STRAWBERRY.model_copy(update={"steps": STRAWBERRY.steps.model_copy(update={"stop_when_decided": True})})

@@ -22,9 +22,28 @@ def test_the_frame_that_falls_out_is_named_and_nothing_else(bad):
     assert not wrong.expected_low <= wrong.area <= wrong.expected_high
 
 
+def test_the_last_frames_are_named_where_they_fall_out():
+    assert [frame.index for frame in wrong_frames(WIDTHS, [0, 100, 220, 350, 20, 30])] == [4, 5]
+
+
 def test_noise_and_opening_again_are_not_wrong():
     assert wrong_frames(WIDTHS, [0, 100, 98, 350, 340, 640]) == []
     assert wrong_frames([20, 19, 18, 19, 20], [0, 100, 200, 90, 0]) == []
+    assert wrong_frames([20, 19, 19], [0, 100, 50]) == []
+
+
+@pytest.mark.parametrize(("area", "wrong"), [(95.0, []), (94.9, [0])])
+def test_an_area_may_fall_by_a_twentieth(area, wrong):
+    assert [frame.index for frame in wrong_frames([20, 19], [100, area])] == wrong
+
+
+def test_many_small_falls_are_no_noise_together():
+    assert [frame.index for frame in wrong_frames([20, 19, 18], [100, 96, 92])] == [2]
+
+
+def test_no_fall_of_a_small_area_is_noise_by_itself():
+    assert [frame.index for frame in wrong_frames([20, 19], [0.5, 0.0])] == [0]
+    assert wrong_frames([20, 19], [0.5, 0.0], least_noise=0.5) == []
 
 
 @given(st.lists(st.floats(0, 1e5), min_size=1, max_size=25))

@@ -135,6 +135,8 @@ class TestTogether:
         assert at_3_mm(together([spoilt, one])) == at_3_mm(one)
         nothing = weak(30.0, 0.0)
         assert at_3_mm(together([nothing, one])) == at_3_mm(one)
+        sure = weak(30.0, 1.0)  # and yet flagged: no odds can be added to it
+        assert at_3_mm(together([sure, sure])) == at_3_mm(sure)
 
     def test_closings_are_the_same_where_a_gripper_cannot_tell_them_apart(self):
         later = press((2.0, 10.0, 16.5, 30.0))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from station.inspection.fruit_size import NO_SIZE, FruitSize
 from station.inspection.judge import early_stop, judge
 from station.inspection.press import Measured, Press
-from station.inspection.sized_limits import sized_limits
+from station.inspection.sized_limits import SizedLimits, sized_limits
 from station.messages import judge as messages
 from station.messages.message import Message
 from station.settings.recipe import find_recipe
@@ -122,6 +122,44 @@ def test_a_size_that_cannot_be_is_no_result_whatever_the_recipe_does_without(siz
     assert early_stop(replace(first, points=first.points[:1]), recipe), "no step can change it"
 
 
+@pytest.mark.parametrize(
+    ("size", "width_mm", "fits"),
+    [
+        # The expected lengths are 20 to 70 mm, and 0.8 to 2 times the width.
+        (FruitSize(20.0), 20.0, True),
+        (FruitSize(19.9), 20.0, False),
+        (FruitSize(70.0), 40.0, True),
+        (FruitSize(70.1), 40.0, False),
+        (FruitSize(28.0), 35.0, True),
+        (FruitSize(27.9), 35.0, False),
+        (FruitSize(60.0), 30.0, True),
+        (FruitSize(60.1), 30.0, False),
+        # Class 2 is from 30 to 40 mm; a length within 2 times 0.6 mm of it does not contradict it.
+        (FruitSize(41.2, 2), 35.0, True),
+        (FruitSize(41.3, 2), 35.0, False),
+        (FruitSize(28.8, 2), 35.0, True),
+        (FruitSize(28.7, 2), 35.0, False),
+        (FruitSize(None, 2), 50.0, True),
+        (FruitSize(None, 2), 50.1, False),
+        (FruitSize(None, 2), 15.0, True),
+        (FruitSize(None, 2), 14.9, False),
+    ],
+)
+def test_up_to_where_a_size_is_believed(size, width_mm, fits):
+    limits = sized_limits(pressed(80, size, width_mm), recipe_with(without_size="plain_limit"))
+    assert (limits.problem is None) is fits
+
+
+def test_a_recipe_without_sizes_has_its_limits_as_written():
+    values = RECIPE.model_dump(mode="json")
+    del values["damage"]["size"]
+    plain = Recipe.model_validate_json(json.dumps(values))
+    for size in (NO_SIZE, FruitSize(6553.5, 9)):
+        assert sized_limits(pressed(80, size), plain) == SizedLimits(
+            plain, factor=1.0, length_mm=None, relative_uncertainty=0.0, without_size=False, problem=None
+        )
+
+
 def test_a_length_a_little_outside_its_class_is_within_the_graders_uncertainty():
     assert not sized_limits(pressed(80, FruitSize(41.1, 2)), RECIPE).problem
     assert sized_limits(pressed(80, FruitSize(41.3, 2)), RECIPE).problem
@@ -142,6 +180,8 @@ def test_a_class_of_another_fruit_is_noticed_by_the_width():
 def test_without_a_size_the_recipe_says_what_is_done(judged_by, size):
     refused = judge(pressed(70, size), recipe_with(**{"from": judged_by}))
     assert (refused.outcome, refused.reasons) == ("NO_RESULT", (Reason.SIZE_UNKNOWN,))
+    missing = messages.NO_LENGTH() if judged_by == "length" else messages.NO_CLASS()
+    assert refused.findings[0].message == missing
     plain = recipe_with(without_size="plain_limit", **{"from": judged_by})
     assert judge(pressed(75, size), plain).outcome == "PASS"
     near = judge(pressed(90, size), plain)

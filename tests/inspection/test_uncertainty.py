@@ -27,11 +27,14 @@ FRUIT = Press(
 def test_the_budget_of_a_press():
     budget = judge(FRUIT, RECIPE).budget
     assert [each.name for each in budget.components] == list(COMPONENTS)
+    assert [each.unit for each in budget.components] == ["", "mm", "mm", "", ""]
     assert [each.relative for each in budget.components] == pytest.approx(
         [0.03, 0.4 / sqrt(12) / 3, 0.38 / sqrt(12) / 3, 2 * 0.0125, 0.8 * 0.6 / 40]
     )
     assert budget.combined == pytest.approx(hypot(*(each.relative for each in budget.components)))
     assert budget.factor == pytest.approx(1.645, abs=0.001)
+    assert budget.expanded == pytest.approx(budget.factor * budget.combined)
+    assert budget.expanded_of("repeatability", "scale") == pytest.approx(budget.factor * hypot(0.03, 0.025))
     assert judge(FRUIT, RECIPE).areas[0].uncertainty_mm2 == pytest.approx(90 * 1.645 * budget.combined, rel=1e-3)
 
 
@@ -72,3 +75,6 @@ def test_the_repeatability_is_interpolated_and_held_beyond_its_ends():
     assert [repeatability_at(closing, measured) for closing in (1, 2, 3, 4, 9)] == pytest.approx(
         [0.1, 0.1, 0.08, 0.06, 0.06]
     )
+    longer = (*measured, Repeatability(closing_mm=6.0, relative=0.02))
+    assert [repeatability_at(closing, longer) for closing in (1, 5, 9)] == pytest.approx([0.1, 0.04, 0.02])
+    assert [repeatability_at(closing, measured[:1]) for closing in (1, 2, 9)] == [0.1, 0.1, 0.1]

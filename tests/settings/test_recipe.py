@@ -1,5 +1,6 @@
 """Recipes: what is wrong is said with file, line, field and what was expected; the shipped ones are good."""
 
+import json
 import re
 import shutil
 from pathlib import Path
@@ -11,7 +12,8 @@ from hypothesis import strategies as st
 from station.errors import BadInputError
 from station.messages import settings as messages
 from station.settings.problems import Problem, SettingsError
-from station.settings.recipe import Recipe, find_recipe, load_recipe, load_recipes
+from station.settings.recipe import Recipe, approved_by_distribution, find_recipe, load_recipe, load_recipes
+from station.settings.recipe_versions import content_sha256
 from station.settings.validation import validated
 from station.settings.yaml_loader import parse_document
 
@@ -206,6 +208,36 @@ BAD = {
             "30: early_stop.growth_mm2_per_mm: expected no less than the damage threshold, 30 mm²/mm, got 20",
         ],
     ),
+    "widths equal": (
+        r"smallest_mm: 20",
+        "smallest_mm: 30",
+        ["6: expected_width.smallest_mm: expected less than largest_mm, 30 mm, got 30"],
+    ),
+    "closing at a given width": (
+        r"start: onset",
+        "start: width\n  start_width_mm: 40\n  measured: while_closing",
+        ["11: steps.measured: expected 'at_rest', as start is 'width': the way to the limits is not known"],
+    ),
+    "results doubled": (
+        r"\[4, 8\]",
+        "[4, 4]",
+        [
+            "12: steps.result_closings_mm[1]: expected more than the closing before, got 4",
+        ],
+    ),
+    "least area as large as the largest": (
+        r"area_mm2: 100",
+        "area_mm2: 100\n      least_area_mm2: 100",
+        ["25: damage.area[0].least_area_mm2: expected less than area_mm2, 100 mm², got 100"],
+    ),
+    "coverage unordered": (
+        r"growth_mm2_per_mm: 30",
+        (
+            "growth_mm2_per_mm: 30\n  uncertainty:\n    repeatability:\n"
+            "      - {closing_mm: 3, relative: 0.1}\n      - {closing_mm: 3, relative: 0.1}"
+        ),
+        ["31: damage.uncertainty.repeatability[1].closing_mm: expected more than the closing before, got 3"],
+    ),
     "section missing": (
         r"imaging:\n(  .*\n)+",
         "",
@@ -222,6 +254,111 @@ def test_a_bad_recipe_is_refused_with_line_field_and_expectation(small, write, o
     with pytest.raises(SettingsError) as caught:
         load_recipe(path)
     assert str(caught.value).splitlines() == [f"{path}:{each}" for each in expected]
+
+
+GOOD = {
+    "steps up to the limit": (r"8\.5", "8"),
+    "steps up to shut": (r"start: onset", "start: width\n  start_width_mm: 8"),
+    "areas equal": (r"area_mm2: 150", "area_mm2: 100"),
+    "early stop at the thresholds": (
+        r"area_mm2: 160\n  growth_mm2_per_mm: 40",
+        "area_mm2: 150\n  growth_mm2_per_mm: 30",
+    ),
+    "while closing": (r"start: onset", "start: onset\n  measured: while_closing"),
+}
+
+
+@pytest.mark.parametrize(("old", "new"), GOOD.values(), ids=GOOD)
+def test_a_recipe_at_its_bounds_is_good(small, write, old, new):
+    text, count = re.subn(old, new, small, count=1)
+    assert count == 1
+    assert load_recipe(write(text)).name == "cherry"
+
+
+SIZE = """\
+  size:
+    from: class
+    reference_mm: 35
+    exponent: 2
+    expected_length:
+      smallest_mm: 25
+      largest_mm: 45
+    expected_ratio:
+      smallest: 1
+      largest: 2
+    uncertainty_mm: 0.6
+    classes:
+      - {number: 1, smallest_mm: 20, largest_mm: 30}
+      - {number: 2, smallest_mm: 40, largest_mm: 50}
+    spread: 0.1
+early_stop:
+"""
+
+
+@pytest.fixture(scope="session")
+def sized(small):
+    """A good recipe whose limits follow the fruit's size."""
+    return small.replace("early_stop:\n", SIZE)
+
+
+@pytest.mark.parametrize(("old", "new"), [("35", "35"), ("35", "25"), ("35", "45"), ("class\n", "length\n")])
+def test_limits_follow_the_size_within_the_expected_lengths(sized, write, old, new):
+    text = sized.replace(old, new, 1)
+    recipe = load_recipe(write(text))
+    assert recipe.damage.size
+    assert [each.middle_mm for each in recipe.damage.size.classes] == [25, 45]
+    assert Recipe.model_validate_json(recipe.model_dump_json()) == recipe
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("reference_mm: 35", "reference_mm: 24.9", "reference_mm: expected within expected_length"),
+        ("reference_mm: 35", "reference_mm: 45.1", "reference_mm: expected within expected_length"),
+        ("smallest_mm: 25", "smallest_mm: 45", "expected_length.smallest_mm: expected less than largest_mm, 45 mm"),
+        ("smallest: 1", "smallest: 2", "expected_ratio.smallest: expected less than largest, 2,"),
+        ("smallest_mm: 20", "smallest_mm: 19.9", "classes[0].smallest_mm: expected"),
+        ("largest_mm: 50", "largest_mm: 50.1", "classes[1].smallest_mm: expected"),
+        ("number: 2", "number: 1", "classes[1].number: expected"),
+        ("smallest_mm: 40", "smallest_mm: 50", "classes[1].smallest_mm: expected less than largest_mm, 50 mm"),
+        (SIZE[SIZE.index("    classes") : SIZE.index("    spread")], "", "classes: expected"),
+    ],
+)
+def test_sizes_that_contradict_each_other_are_refused(sized, write, old, new, expected):
+    assert sized.count(old)
+    head, _, tail = sized.rpartition(old)
+    with pytest.raises(SettingsError) as caught:
+        load_recipe(write(head + new + tail))
+    (line,) = str(caught.value).splitlines()
+    assert f" damage.size.{expected}" in line
+
+
+@pytest.mark.parametrize(
+    ("decided_by", "deciding_mm", "passing_mm"),
+    [("every_limit", 8, 8), ("first_trusted", 4, 4), ("every_trusted", 4, 8)],
+)
+def test_the_limits_that_decide(small, write, decided_by, deciding_mm, passing_mm):
+    damage = load_recipe(write(small.replace("damage:\n", f"damage:\n  decided_by: {decided_by}\n"))).damage
+    assert (damage.deciding_closing_mm, damage.passing_closing_mm) == (deciding_mm, passing_mm)
+
+
+def test_the_guard_band_has_the_coverage_of_a_normal_distribution(small, write):
+    assert load_recipe(write(small)).damage.uncertainty.factor == pytest.approx(1.6449, abs=1e-4)
+
+
+def test_what_a_recipe_does_not_say_is_left_out_of_its_values(small, write):
+    """So that recipes of before these fields keep their content hash, and with it their approval."""
+    values = load_recipe(write(small)).model_dump()
+    assert {"stop_when_decided", "measured"}.isdisjoint(values["steps"])
+    assert {"decided_by", "size", "uncertainty"}.isdisjoint(values["damage"])
+    assert "press" not in values
+    text = small.replace("start: onset", "start: onset\n  measured: while_closing\n  stop_when_decided: true")
+    text = text.replace("damage:\n", "press:\n  attempts: 2\ndamage:\n  decided_by: first_trusted\n")
+    values = load_recipe(write(text)).model_dump()
+    assert values["steps"]["measured"] == "while_closing"
+    assert values["steps"]["stop_when_decided"] is True
+    assert values["press"]["attempts"] == 2
+    assert values["damage"]["decided_by"] == "first_trusted"
 
 
 def test_of_very_many_problems_the_first_fifty_are_told(small, write):
@@ -277,6 +414,20 @@ class TestShipped:
         for recipe in load_recipes().values():
             assert recipe.segmentation.paper.model_fields_set == set(type(recipe.segmentation.paper).model_fields)
             assert recipe.segmentation.paper == type(recipe.segmentation.paper)()
+
+
+class TestApprovedByTheDistribution:
+    def test_each_shipped_recipe_by_the_hash_of_its_content(self, root):
+        approved = approved_by_distribution()
+        assert approved == json.loads((root / "recipes" / "approved.json").read_text())
+        assert approved == {name: content_sha256(recipe) for name, recipe in load_recipes().items()}
+
+    @pytest.mark.parametrize("content", [None, "", "{", "[]", "7"])
+    def test_none_without_a_list_that_can_be_read(self, tmp_path, monkeypatch, content):
+        if content is not None:
+            (tmp_path / "approved.json").write_text(content)
+        monkeypatch.setattr("station.settings.recipe.shipped_folder", lambda: tmp_path)
+        assert approved_by_distribution() == {}
 
 
 class TestFolders:
@@ -339,6 +490,17 @@ class TestFinding:
             "blueberry, raspberry, rubber_ball, strawberry (in "
         )
 
+    def test_a_name_unlike_any_is_given_no_hint(self):
+        with pytest.raises(
+            BadInputError, match=r"^recipe zzz: expected the path of a \.yaml file or one of blueberry, "
+        ):
+            find_recipe("zzz")
+
+    def test_what_holds_a_separator_is_a_path(self, small, write, tmp_path, monkeypatch):
+        write(small, "plain")
+        monkeypatch.chdir(tmp_path)
+        assert find_recipe("./plain").name == "cherry"
+
     def test_a_broken_neighbour_does_no_harm_and_is_named_where_it_may_be_the_one(self, small, write, tmp_path):
         write(small)
         broken = write("name: plum", "plum.yaml")
@@ -353,7 +515,11 @@ VALUES = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=3 * settings().max_examples,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(data=st.data())
 def test_a_mutated_recipe_is_a_recipe_or_a_list_of_problems(small, data):
     lines = small.splitlines()

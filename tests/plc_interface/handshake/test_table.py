@@ -270,9 +270,10 @@ def test_a_doubled_command_of_the_run_before_is_not_carried_out_again(bench):
     assert view(made.state)["command_result"] == BY_NAME["command_result"].code("timed_out")
 
 
-def test_a_trigger_bit_left_high_over_a_reconnect_is_the_same_trigger(bench):
+@pytest.mark.parametrize("trigger_id", [1, 7])
+def test_a_trigger_bit_left_high_over_a_reconnect_is_the_same_trigger(bench, trigger_id):
     made = bench()
-    made.run()
+    made.run(trigger_id)
     made.feed(ev.WriterWithdrawn)
     made.feed(ev.WriterGranted)
     assert made.state.arming is Arming.DISARMED
@@ -294,6 +295,34 @@ def test_a_plc_that_writes_the_sequence_first_and_its_bit_then_sees_result_valid
     assert made.state.result is Result.TAKEN
     made.write("enable")
     assert made.state.result is Result.EMPTY
+
+
+def test_the_very_first_sequence_is_acknowledged_by_its_number(bench):
+    made = bench()
+    made.run(sequence=1)
+    made.feed(ev.OutcomeReceived, made.outcome(sequence=1))
+    made.write("enable", acknowledged_sequence=1)
+    assert made.state.result is Result.EMPTY
+    assert len(made.of(do.NotifyAcknowledged)) == 1
+
+
+def test_the_very_first_outcome_may_come_before_the_plc_has_written(bench):
+    made = bench()
+    made.link(Open(running=None, outcomes=(made.outcome(sequence=1),)))
+    assert [outcome.sequence for outcome in made.state.queue] == [1]
+
+
+def test_starts_and_resets_of_the_counters_wrap_round(bench):
+    journal = bench(Journal(boots=2**16 - 1, epoch=2**32 - 1)).state.journal
+    assert (journal.boots, journal.epoch) == (0, 0)
+    journal = bench(Journal(boots=2**16 - 2, epoch=2**32 - 2)).state.journal
+    assert (journal.boots, journal.epoch) == (2**16 - 1, 2**32 - 1)
+    made = bench(Journal(epoch=2**32 - 3))
+    made.armed()
+    for epoch in (2**32 - 1, 0):
+        made.write("enable", "reset_counters")
+        assert made.state.journal.epoch == epoch
+        made.write("enable")
 
 
 def test_the_bit_alone_or_a_sequence_not_shown_acknowledges_nothing(bench):

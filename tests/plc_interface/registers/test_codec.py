@@ -31,6 +31,24 @@ def test_references_on_the_wire(name, high_first, low_first):
     assert encode(register, REFERENCES[name], LOW) == low_first
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "high_first"),
+    [
+        ("control", 0x8001, (0x8001,)),
+        ("alarms", 0x8000_0001, (0x8000, 0x0001)),
+        ("result_area_mm2_x100", -2, (0xFFFF, 0xFFFE)),
+    ],
+)
+def test_kinds_without_a_reference_on_the_wire(name, value, high_first):
+    assert encode(BY_NAME[name], value, HIGH) == high_first
+    assert encode(BY_NAME[name], value, LOW) == high_first[::-1]
+
+
+def test_the_published_names_of_kinds_and_word_orders():
+    assert list(Kind) == ["u16", "i16", "u32", "i32", "u64", "f32", "text", "bits16", "bits32"]
+    assert list(WordOrder) == ["high_first", "low_first"]
+
+
 def values(register: Register) -> st.SearchStrategy:
     match register.kind:
         case Kind.TEXT:
@@ -74,6 +92,7 @@ def test_there_is_none_is_a_value_too(name, raw, order):
 
 
 def test_what_has_no_invalid_value_takes_none_of_it():
+    assert is_invalid(BY_NAME["trigger_id"], 0xFFFF) is False
     with pytest.raises(RegisterValueError, match="trigger_id has no invalid value"):
         encode(BY_NAME["trigger_id"], None)
 
@@ -120,6 +139,7 @@ def test_a_text_ends_at_its_first_nul_and_may_be_filled_up_with_spaces():
         ("write_key", 1, "knows no value 1"),
         ("control", 1 << 9, "no meaning for the bits 0x0200"),
         ("result_confidence_pct", 101, "from 0 to 100, not 101"),
+        ("result_area_mm2_x100", -1, "from 0 to 2.14748e+09, not -1"),
     ],
 )
 def test_a_value_without_a_meaning_is_told(name, value, says):
@@ -127,7 +147,15 @@ def test_a_value_without_a_meaning_is_told(name, value, says):
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("command_code", 5), ("write_key", 0x5AFE), ("control", 0x1FF), ("lot", "")]
+    ("name", "value"),
+    [
+        ("command_code", 5),
+        ("write_key", 0x5AFE),
+        ("control", 0x1FF),
+        ("lot", ""),
+        ("result_confidence_pct", 0),
+        ("result_confidence_pct", 100),
+    ],
 )
 def test_a_value_with_a_meaning_stands(name, value):
     assert problem(BY_NAME[name], value) == ""
@@ -136,6 +164,8 @@ def test_a_value_with_a_meaning_stands(name, value):
 def test_flags_by_name():
     control = BY_NAME["control"]
     assert control.flags(["enable", "acknowledge"]) == 0b101
+    assert control.flags(["acknowledge"]) == 0b100
+    assert control.flags([]) == 0
     assert control.names(0b101) == {"enable", "acknowledge"}
     with pytest.raises(KeyError):
         control.bit("fire")

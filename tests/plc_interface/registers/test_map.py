@@ -19,7 +19,7 @@ LARGEST_READ, LARGEST_WRITE, LARGEST_WRITE_OF_FC23 = 125, 123, 121
 
 def test_registers_ascend_and_never_overlap():
     assert all(before.end <= after.address for before, after in pairwise(REGISTERS))
-    assert len(BY_NAME) == len(REGISTERS)
+    assert len(BY_NAME) == len(REGISTERS) == len(set(REGISTERS))
 
 
 @pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.name)
@@ -56,6 +56,11 @@ def test_every_alarm_of_the_station_has_its_bit():
         f"alarm_{number}" for number in every
     }
     assert active_alarms(values) == tuple(sorted(every))
+
+
+@pytest.mark.parametrize("numbers", [(), (1,), (2, 5), (32, 33, 64)])
+def test_active_alarms_are_read_as_they_were_published(numbers):
+    assert active_alarms(alarm_values(sum(1 << number - 1 for number in numbers))) == numbers
 
 
 @pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.name)
