@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Awaitable, Callable
 
+from station.devices.arm.faults import ArmFault
 from station.errors import StationError
 from station.messages import device as messages
 from station.messages.message import Message
@@ -121,5 +122,10 @@ class DeviceMonitor:
         before, self.fault = self.fault, fault
         if (before and before.message) != (fault and fault.message):
             log.log(logging.WARNING if fault else logging.INFO, "%s: %s", self.name, fault.message if fault else "well")
-        if (before is None) != (fault is None) or type(before) is not type(fault):
+        if _kind(before) != _kind(fault):
             self._on_change(fault)
+
+
+def _kind(fault: StationError | None) -> object:
+    """What the cycle goes by: a stale arm found in a protective stop is news, one that is staler is not."""
+    return (type(fault), fault.cause if isinstance(fault, ArmFault) else None)
