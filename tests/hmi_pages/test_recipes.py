@@ -1,5 +1,6 @@
 """The recipes page in a real browser: drafts, approval, what-if; and its form and strip chart without one."""
 
+import re
 from typing import Any
 
 import pytest
@@ -85,7 +86,8 @@ def test_the_typed_values_are_tried_on_past_fruit_and_against_the_marks(orchard:
     with short_transaction(orchard.home / "records") as connection:
         place_mark(connection, orchard.soft.sequence, "bad", "Ida")
     tried = person.go("/recipes/strawberry/edit").locator("[data-chart-here] .tried")
-    expect(tried).to_contain_text("Marked bad and passed: 0 of 1, 0 before")
+    # Known or not by where its press ended, which is not the same in each run.
+    expect(tried).to_contain_text(re.compile(r"Marked bad and passed: 0 of 1, 0 before|cannot be known: 1\b"))
     edit(person.page, "early_stop.area_mm2", "5")
     expect(tried).to_contain_text("no valid recipe")
 
