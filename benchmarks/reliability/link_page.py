@@ -174,11 +174,13 @@ def _draw(disturbed: Sequence[Fruit], chart: Path) -> None:
     )
     figure = Figure(figsize=(10, 3.2), layout="constrained")
     for axes, (title, of) in zip(figure.subplots(1, len(what), sharey=True), what, strict=True):
-        for link in LinkName:
+        for number, link in enumerate(LinkName):
             values = sorted(_values((fruit for fruit in disturbed if fruit.link == link), of))
             if values:
-                axes.step([0.0, *values], np.linspace(0.0, 1.0, len(values) + 1), where="post", label=link.value)
+                shares = np.linspace(0.0, 1.0, len(values) + 1)
+                axes.step([0.0, *values], shares, where="post", label=link.value, color=f"C{number}")
         axes.set_xscale("symlog", linthresh=0.1)
+        axes.set_xlim(0.0, 10.0)
         axes.set_xlabel(title)
         axes.grid(visible=True, alpha=0.3)
     handles, labels = figure.axes[0].get_legend_handles_labels()
