@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-import socket
+from collections.abc import Callable
 
 import pytest
 
@@ -17,16 +17,13 @@ RESERVED = b"\xff\xff"
 """Flags that ZMTP does not have."""
 
 
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return probe.getsockname()[1]
-
-
 @pytest.mark.parametrize("spoilt", [SWALLOWED, RESERVED])
 @pytest.mark.parametrize("towards", ["client", "server"])
-def test_a_connection_that_was_spoilt_is_made_anew(spoilt: bytes, towards: str):
+def test_a_connection_that_was_spoilt_is_made_anew(
+    spoilt: bytes, towards: str, unused_ports: Callable[[int], list[int]]
+):
     async def scenario() -> None:
-        behind, port = free_port(), free_port()
+        behind, port = unused_ports(2)
         writers: list[tuple[asyncio.StreamWriter, asyncio.StreamWriter]] = []
 
         async def carry(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
