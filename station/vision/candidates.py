@@ -17,6 +17,9 @@ _STRONG_SHARE, _LOW_QUANTILE = 0.6, 0.3
 """Of the strongest curvature, what counts as curved; and the quantile of the level there that a body mostly reaches."""
 _OVER_SPREAD = 3.0
 """In standard deviations of the background's level: a candidate is as far above it."""
+_FAINT_SPREADS, _FAINT_GATE = 8.0, 2.5
+"""A faint body, whose gate is lower, has moved wherever it is so many standard deviations above the background's level:
+one achene or a rim may outshine all else of it. At 7 or 10 more contacts of bruised fruit are less than half found."""
 _OWN_SHARE = 0.35
 """Of its own strongest place: what belongs to one of several contacts, so that a strong neighbour hides none."""
 _WEAK_RADIUS_PX = 7
@@ -37,7 +40,7 @@ class Candidates(NamedTuple):
 def body_candidates(moved: Movement, threshold: float, constants: Constants) -> Candidates:
     """Where one body may lie: what has moved clear of the noise, or curves enough to reach the threshold.
 
-    A place has moved from half of what the curved places mostly reach on.
+    A place has moved from half of what the curved places mostly reach on; of a faint body wherever it stands out.
 
     Args:
         moved: from `region.movement`.
@@ -51,22 +54,29 @@ def body_candidates(moved: Movement, threshold: float, constants: Constants) -> 
     if strongest <= threshold:
         return Candidates([], level)
     strong = level[curvature > min(threshold, _STRONG_SHARE * strongest)]
-    lowest = max(_OVER_SPREAD * seen.spread(moved), constants.candidate_share * quantile(strong, _LOW_QUANTILE))
+    spread_levels = seen.spread(moved)
+    lowest = max(_OVER_SPREAD * spread_levels, constants.candidate_share * quantile(strong, _LOW_QUANTILE))
+    if strongest < _FAINT_GATE * threshold:
+        lowest = min(lowest, _FAINT_SPREADS * spread_levels)
     standing_out = ((level > lowest) | (curvature > threshold)).astype(np.uint8)
     found = [part for part in _parts(standing_out) if cv2.minMaxLoc(curvature, part)[1] > threshold]
     return Candidates(_heaviest_first(level, found), level)
 
 
 def around(place: tuple[int, int], moved: Movement, constants: Constants) -> Candidates:
-    """Where a contact too weak to curve the gel clear of the noise may lie: a small disc around its place.
+    """Where a contact too weak to curve the gel clear of the noise may lie: a small disc, and what has moved with it.
 
     Args:
         place: x and y, px of the movement.
         moved: from `region.movement`.
         constants: the level's window.
     """
-    level = level_of(moved, constants.level_window).levels
-    return Candidates([disc(level.shape, place, _WEAK_RADIUS_PX)], level)
+    seen = level_of(moved, constants.level_window)
+    start = disc(seen.levels.shape, place, _WEAK_RADIUS_PX)
+    _, labels = cv2.connectedComponents((seen.levels > _FAINT_SPREADS * seen.spread(moved)).astype(np.uint8))
+    joined = np.unique(labels[start > 0])
+    start |= np.isin(labels, joined[joined > 0]).astype(np.uint8)
+    return Candidates([start], seen.levels)
 
 
 def disc(shape: tuple[int, ...], place: tuple[int, int], radius_px: int) -> Mask:

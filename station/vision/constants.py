@@ -119,6 +119,10 @@ class Constants:
         0.04, "of the strong change", "level of an element where directions are random", "fit"
     )
     element_coherent: float = constant(0.72, "of the strong change", "how much higher per unit of coherence", "fit")
+    element_lone: float = constant(0.46, "of the strong change", "the same of a lone element, half its height", "fit")
+    few_elements_px: float = constant(
+        5000.0, "px", "area of a region beyond which its elements are many", "fit", "working"
+    )
     half_sure: float = constant(
         0.38, "", "logarithm of the areas at two levels at which the confidence is halved", "fit"
     )

@@ -390,7 +390,8 @@ class RobustMethod:
         state.candidates = around(place, state.moved, self._constants)
         start, body = state.candidates.regions[0], None
         for reach_px in _WEAK_REACHES_PX:  # no further than its own region fills, since drift is all around it
-            body = self._region(state, start, 1 - disc(start.shape, place, reach_px))
+            near = disc(start.shape, place, reach_px)
+            body = self._region(state, start & near, 1 - near)
             if body is None or body.radii.max() < _REACHED * reach_px:
                 break
         if body is not None and (outline := self._outlined(state, body)) is not None:
@@ -432,7 +433,7 @@ class RobustMethod:
             return
         shown_px = round(cv2.countNonZero(state.mask) * state.changed.size / state.mask.size)
         # An outline that hardly holds any change has been drawn around nothing.
-        drawn = cv2.countNonZero(state.changed) >= self._constants.witness_least * shown_px
+        drawn = state.gate > 1 or cv2.countNonZero(state.changed) >= self._constants.witness_least * shown_px
         held = state.mask | before.least if drawn else before.least
         if not drawn or np.array_equal(held, before.least):
             height, width = self._shape[:2]

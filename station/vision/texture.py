@@ -37,7 +37,9 @@ def element_level(length: FloatImage, region: Mask, coherence: float, constants:
         coherence: the region's.
         constants: the levels.
     """
-    share = constants.element_random + constants.element_coherent * coherence
+    p, area_px = constants, cv2.countNonZero(region)
+    few = min(1.0, (p.few_elements_px / max(area_px, 1)) ** 2)
+    share = max(p.element_random + p.element_coherent * coherence, p.element_lone * few)
     return share * strength(length, region)
 
 
