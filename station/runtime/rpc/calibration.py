@@ -8,12 +8,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
 
-from station.calibration.calibration_procedure import CalibrationProcedure, Draft
+from station.calibration.calibration_procedure import CalibrationProcedure
 from station.calibration.checks import check_name, failed_check
 from station.calibration.model import Calibration, Verification
+from station.calibration.report import calibration_files, verification_files
 from station.calibration.rig import Place, Progress, Unit
 from station.calibration.store import CalibrationStore
-from station.calibration.verification_procedure import VerificationProcedure, VerificationResult
+from station.calibration.verification_procedure import VerificationProcedure
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (
@@ -203,7 +204,7 @@ class PanelCalibration:
             lambda progress: _note_step(run, progress),
         ).run()
         before, new = self._store.current(draft.calibration.serial), draft.calibration
-        files = await asyncio.to_thread(_calibration_files, draft)
+        files = await asyncio.to_thread(calibration_files, draft)
         entry = calibration_entry(
             run.actor.who, "", f"sensor {new.serial}", None if before is None else before.id, new.id
         )
@@ -230,7 +231,7 @@ class PanelCalibration:
             run.actor.who,
             lambda progress: _note_step(run, progress),
         ).run()
-        files = await asyncio.to_thread(_verification_files, verified, calibration)
+        files = await asyncio.to_thread(verification_files, verified, calibration)
         made = verified.verification
         entry = verification_entry(
             run.actor.who, f"sensor {calibration.serial}", calibration.id, made.id, passed=made.passed
@@ -317,16 +318,3 @@ def _files_in(folder: Path) -> tuple[str, ...]:
     with contextlib.suppress(OSError):
         return tuple(name for name in _PICTURES if (folder / name).is_file())
     return ()
-
-
-# The plots' library is a third of what this process would load at its start, for pages that are made once a shift.
-def _calibration_files(draft: Draft) -> dict[str, bytes]:
-    from station.calibration.report import calibration_files  # noqa: PLC0415
-
-    return calibration_files(draft)
-
-
-def _verification_files(verified: VerificationResult, calibration: Calibration) -> dict[str, bytes]:
-    from station.calibration.report import verification_files  # noqa: PLC0415
-
-    return verification_files(verified, calibration)
