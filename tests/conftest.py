@@ -20,6 +20,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from threadpoolctl import threadpool_limits
 
+from station.cli import main
+
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 GRACE_S = 3.0
 
@@ -169,7 +171,29 @@ def real_images() -> Path:
 
 
 @pytest.fixture
-def analyze() -> Callable[..., subprocess.CompletedProcess[str]]:
+def analyze(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run `station analyze` as its program does, in this process: to load it anew takes longer than what it does."""
+
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+        command = ["station", "analyze", *map(str, arguments)]
+        monkeypatch.setattr(sys, "argv", command)
+        capfd.readouterr()
+        mask = os.umask(0o022)
+        try:
+            with pytest.raises(SystemExit) as ended:
+                main()
+        finally:
+            os.umask(mask)
+        assert isinstance(ended.value.code, int)
+        return subprocess.CompletedProcess(command, ended.value.code, *capfd.readouterr())
+
+    return run
+
+
+@pytest.fixture
+def analyze_apart() -> Callable[..., subprocess.CompletedProcess[str]]:
     """Run `station analyze` as a user does."""
 
     def run(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
