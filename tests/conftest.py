@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import functools
 import os
 import shutil
 import signal
@@ -171,13 +172,13 @@ def real_images() -> Path:
 
 
 @pytest.fixture
-def analyze(
+def station_here(
     capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Run `station analyze` as its program does, in this process: to load it anew takes longer than what it does."""
+    """Run the command line as its program does, in this process: to load it anew takes longer than what it does."""
 
     def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-        command = ["station", "analyze", *map(str, arguments)]
+        command = ["station", *map(str, arguments)]
         monkeypatch.setattr(sys, "argv", command)
         capfd.readouterr()
         mask = os.umask(0o022)
@@ -190,6 +191,14 @@ def analyze(
         return subprocess.CompletedProcess(command, ended.value.code, *capfd.readouterr())
 
     return run
+
+
+@pytest.fixture
+def analyze(
+    station_here: Callable[..., subprocess.CompletedProcess[str]],
+) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run `station analyze` in this process."""
+    return functools.partial(station_here, "analyze")
 
 
 @pytest.fixture
