@@ -62,9 +62,6 @@ class Past:
     """Reader of the records.
 
     Each method raises `RecordsError` if they cannot be read, and `PanelBusyError` if too many wait or one takes 20 s.
-
-    Args:
-        site: the configuration in force.
     """
 
     def __init__(self, site: Configuration) -> None:

@@ -17,7 +17,6 @@ def no_result(running: Running, at: Moment, *reasons: Reason) -> Outcome:
     """Make NO_RESULT for an inspection whose outcome the station did not give, or not in time.
 
     Args:
-        running: the known data of the inspection.
         at: the inspection's end.
         reasons: LATE marks the outcome as late.
     """

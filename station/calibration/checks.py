@@ -32,8 +32,6 @@ def calibration_checks(
     """Check a calibration against its limits.
 
     Args:
-        settings: ball and limits.
-        recipe: the ball's.
         steps: all of them, as measured.
         onset_mm: width of the contact onset.
         noise: of the untouched gel.
@@ -115,8 +113,6 @@ def verification_checks(
     """Check a verification against the calibration.
 
     Args:
-        settings: the tolerances.
-        calibration: the unit's.
         curve: the widths pressed now, in order of closing.
         onset_mm: width of the contact onset; None if nothing was touched.
         pixel_levels: noise of the untouched gel.

@@ -49,7 +49,6 @@ class VerificationProcedure:
     Args:
         golden: the calibration's picture of the untouched gel.
         presses: the calibration's pictures of the ball, in the order of its curve.
-        on_progress: called with the progress.
     """
 
     def __init__(

@@ -147,7 +147,7 @@ def define_plural(id: str, english: str, plural: str, counted: str, **parameters
 
 
 def _with_names(parameters: Mapping[str, Kind], english: str) -> Mapping[str, Kind]:
-    return dict.fromkeys(fields(english), Name()) | parameters
+    return {**dict.fromkeys(fields(english), Name()), **parameters}
 
 
 def fields(sentence: str) -> set[str]:

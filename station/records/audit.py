@@ -128,7 +128,6 @@ def append_restored(connection: Connection, by: str, known: Head | None, new: di
     """Append, after a restored backup's last row, a row that records the restore; known newer rows leave a gap.
 
     Args:
-        connection: in a write transaction on the restored database.
         by: the person's name.
         known: the head of the trail before the restore; None if there was none.
         new: what the row records of the backup.

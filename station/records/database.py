@@ -28,11 +28,7 @@ BUSY_MS = 1000
 
 
 def records_folder(home: Path) -> Path:
-    """Return the records' folder.
-
-    Args:
-        home: the station's home folder.
-    """
+    """Return the records' folder."""
     return home / "records"
 
 
@@ -72,7 +68,6 @@ def check(path: Path, within_s: float = CHECK_S) -> None:
 
     Args:
         path: the database, which exists.
-        within_s: longest time.
 
     Raises:
         DamagedError: it is damaged.

@@ -31,7 +31,6 @@ def start_lot(connection: Connection, name: str, grower: str, *, correct: bool =
 
     Args:
         name: as the PLC gives it with each trigger.
-        grower: grower of the fruit.
         correct: replace the grower registered before.
 
     Raises:
@@ -73,7 +72,6 @@ def read_lots(connection: Connection, limit: int, grower: str | None = None, nam
     """Read the registered lots, newest first.
 
     Args:
-        limit: at most so many.
         grower: all growers by default.
         name: only the lot of this name.
     """

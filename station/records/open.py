@@ -93,7 +93,6 @@ def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
     """Open the records; the folder is locked by the caller. Blocks.
 
     Args:
-        settings: for the images.
         boot: name of this start of the station.
 
     Raises:

@@ -66,11 +66,7 @@ def read_alarms(connection: Connection) -> tuple[AlarmRow, ...]:
 
 
 def read_alarm_log(connection: Connection, limit: int) -> tuple[AlarmEntry, ...]:
-    """Read the log of alarms, newest first.
-
-    Args:
-        limit: at most so many.
-    """
+    """Read the log of alarms, newest first."""
     columns = (alarms_log.c.utc_ms, alarms_log.c.id, alarms_log.c.change, alarms_log.c.detail, alarms_log.c.sequence)
     rows = connection.execute(select(*columns).order_by(alarms_log.c.row.desc()).limit(limit))
     return tuple(AlarmEntry(*row) for row in rows)

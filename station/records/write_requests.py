@@ -88,7 +88,6 @@ def conclude(
     """Store how an inspection ended, unless it is stored already.
 
     Args:
-        record: its result.
         images_states: state of its images, by the outcome that decides: `PASS` or `other`.
 
     Returns:
@@ -173,7 +172,6 @@ def queue_event(connection: Connection, kind: OutboxKind, row: int) -> None:
 
     Args:
         connection: the writer's, in the transaction of the change.
-        kind: of the row.
         row: its sequence, id or number.
     """
     connection.execute(insert(outbox).values(kind=kind, row=row))

@@ -95,10 +95,7 @@ class HealthServer:
         Args:
             host: address or host name.
             port: TCP; 0 takes a free one.
-            metrics: for /metrics.
-            liveness: for /livez.
             readiness: called at each /readyz; must not block.
-            version: for /version.
         """
         self._host = host
         self._port = port

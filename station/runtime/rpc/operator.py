@@ -52,7 +52,6 @@ class PanelServer:
     """Channel server for the HMI.
 
     Args:
-        configuration: in force.
         production: what is shown and commanded.
         records: gets lots.
         alarms: alarm commands of people.
