@@ -35,6 +35,8 @@ def records_folder(home: Path) -> Path:
 def open_engine(path: Path, mode: Literal["ro", "rw", "rwc"]) -> Engine:
     """Make an engine with write-ahead logging, durable commits and real transactions.
 
+    It pools no connection, so that nothing of it is left to be closed.
+
     Args:
         mode: read only, read and write, or made if missing.
     """
