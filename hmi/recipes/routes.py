@@ -30,6 +30,7 @@ from station.channel.panel_recipe_orders import (
     ApproveRecipe,
     ImportedRecipe,
     ImportRecipe,
+    RecipeOrder,
     RejectRecipe,
     RevertRecipe,
     SaveDraft,
@@ -205,7 +206,7 @@ async def whatif(hmi: HmiNow, name: Name, last: Annotated[int, Form(ge=1, le=100
     return go_to(f"/jobs/{job.id}?back=/recipes/{name}")
 
 
-async def _order(hmi: Hmi, order: SubmitRecipe | ApproveRecipe | RejectRecipe | RevertRecipe) -> Response:
+async def _order(hmi: Hmi, order: RecipeOrder) -> Response:
     await hmi.gateway.request(order, Noted, deadline_s=DEADLINE_S)
     return go_to(f"/recipes/{order.name}")
 
