@@ -107,7 +107,7 @@ async def save(
     try:
         changes = changed(values, typed)
     except BadFieldError as error:
-        why = locale.text("recipes.bad_field", field=_title(locale, error.field.key, error.field.title),
+        why = locale.text("recipes.bad_field", field=locale.own(error.field.key, error.field.title),
                            expected=locale.sentence(error.field.expected))  # fmt: skip
         return await _form(request, hmi, locale, name, typed, why, reason)
     if not changes:
@@ -239,15 +239,11 @@ async def _form(
         wrong=wrong,
         reason=reason,
         drawn=await _drawn(hmi, locale, stored, values),
-        title=lambda each: _title(locale, each.key, each.title),
+        title=lambda each: locale.own(each.key, each.title),
         reply=known,
         editable=known.editable and caller_of(request).may(Right.EDIT_RECIPES),
         tab="edit",
     )
-
-
-def _title(locale: Locale, key: str, english: str) -> str:
-    return locale.own(key, english)
 
 
 def _typed(texts: Mapping[str, str]) -> dict[str, str]:

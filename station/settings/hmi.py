@@ -7,7 +7,7 @@ from pydantic import model_validator
 
 from station.messages import settings as messages
 from station.settings.model import Settings, setting
-from station.settings.network import Host
+from station.settings.network import Host, Port
 from station.settings.paths import File
 from station.settings.plc import channel_endpoint
 from station.settings.problems import FieldError
@@ -47,7 +47,7 @@ class HmiSettings(Settings):
         description="Network address on which the operators' pages are served.",
         max_length=253,
     )
-    port: int = setting(8080, title="Port", description="TCP port of the operators' pages over HTTP.", ge=1, le=65_535)
+    port: Port = setting(8080, title="Port", description="TCP port of the operators' pages over HTTP.")
     names: tuple[Host, ...] = setting(
         ("127.0.0.1", "localhost"),
         title="Names",

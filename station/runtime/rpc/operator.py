@@ -14,7 +14,6 @@ from station.channel.panel_live import (
     GetRecent,
     GetRecipes,
     OperatorCommand,
-    OperatorCommandView,
     PanelState,
     PersonNoted,
     Picture,
@@ -85,7 +84,7 @@ class PanelServer:
             GetFruit: self._fruit,
             GetPicture: self._picture,
             GetRecipes: self._recipes,
-            OperatorCommand: self._order,
+            OperatorCommand: self._operator_commands.start,
             PersonNoted: self._person,
             **alarms.handlers,
         }
@@ -171,9 +170,6 @@ class PanelServer:
             active=None if active is None else _recipe_view(active),
             problems=self._book.problems,
         )
-
-    async def _order(self, request: OperatorCommand) -> OperatorCommandView:
-        return await self._operator_commands.start(request)
 
     async def _person(self, request: PersonNoted) -> Noted:
         person, action = request.person, f"panel.{request.what}"
