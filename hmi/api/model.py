@@ -73,8 +73,8 @@ class HealthAnswer(Model):
     """Readiness of the station, and the state of each of its parts."""
 
     ready: bool = Field(description="A trigger would be accepted now.")
-    why: str = Field(description="Why not, with the remedy; empty where ready.")
-    why_message: ApiMessage | None
+    why: Sentence = Field(description="Why not, with the remedy; empty where ready.")
+    why_message: Said | None = Field(validation_alias="why")
     mode: int = Field(description="PackML: 1 production, 2 maintenance, 3 manual.")
     simulated: bool
     parts: list[Part]

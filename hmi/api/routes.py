@@ -9,9 +9,7 @@ from pydantic import BeforeValidator
 
 from hmi.api.access import changer, reader
 from hmi.api.model import (
-    AlarmAnswer,
     AlarmAnswers,
-    ApiMessage,
     Error,
     HealthAnswer,
     InspectionDetails,
@@ -21,7 +19,6 @@ from hmi.api.model import (
     LotBegin,
     LotList,
     LotName,
-    Part,
     RecipeDetails,
     RecipeList,
     RecipeSummary,
@@ -78,22 +75,14 @@ EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo
 async def health(hmi: HmiNow, _: Reader) -> HealthAnswer:
     """Readiness of the station, and the state of each of its parts."""
     reply = await hmi.gateway.request(GetHealth(), Health, deadline_s=DEADLINE_S)
-    return HealthAnswer(
-        ready=reply.ready,
-        why=str(reply.why or ""),
-        why_message=reply.why and ApiMessage.of(reply.why),
-        mode=reply.mode,
-        simulated=reply.simulated,
-        parts=[Part.model_validate(part) for part in reply.parts],
-        versions=reply.versions,
-    )
+    return HealthAnswer.model_validate(reply)
 
 
 @router.get("/alarms", tags=["health"])
 async def alarms(hmi: HmiNow, _: Reader) -> AlarmAnswers:
     """Alarms that are not in their normal state."""
     reply = await hmi.gateway.request(ListAlarms(), AlarmList, deadline_s=DEADLINE_S)
-    return AlarmAnswers(alarms=[AlarmAnswer.model_validate(alarm) for alarm in reply.alarms])
+    return AlarmAnswers.model_validate(reply)
 
 
 @router.get("/inspections", tags=["results"])
