@@ -119,7 +119,7 @@ class PanelCalibration:
         return CalibrationState(
             serial=serial,
             in_use=self._devices.calibration.in_force.words,
-            calibration=None if calibration is None else self._calibration_view(calibration),
+            calibration=None if calibration is None else self._view(calibration, calibration.summary(), passed=True),
             verification=None if verification is None else self._verification_view(verification),
             age_s=figures.age_s,
             verification_age_s=figures.verification_age_s,
@@ -261,28 +261,18 @@ class PanelCalibration:
         kind = self._run.kind if self._run is not None else "run"
         self._audit.log(AuditEntry(actor.who, actor.role, f"calibration.{what}", kind))
 
-    def _calibration_view(self, made: Calibration) -> CalibrationView:
-        return CalibrationView(
-            serial=made.serial,
-            id=made.id,
-            made_utc_ms=round(1000 * made.made_at.timestamp()),
-            operator=made.operator,
-            words=made.summary(),
-            passed=True,
-            checks=_check_views(made),
-            folder=str(self._store.folder(made).absolute()),
-            pictures=_files_in(self._store.folder(made)),
-        )
-
     def _verification_view(self, made: Verification) -> CalibrationView:
         ratio = None if made.area_ratio is None else messages.RATIO_OF_BALL(percent=100 * made.area_ratio)
+        return self._view(made, ratio, passed=made.passed)
+
+    def _view(self, made: Calibration | Verification, words: Message | None, *, passed: bool) -> CalibrationView:
         return CalibrationView(
             serial=made.serial,
             id=made.id,
             made_utc_ms=round(1000 * made.made_at.timestamp()),
             operator=made.operator,
-            words=ratio,
-            passed=made.passed,
+            words=words,
+            passed=passed,
             checks=_check_views(made),
             folder=str(self._store.folder(made).absolute()),
             pictures=_files_in(self._store.folder(made)),
@@ -290,9 +280,7 @@ class PanelCalibration:
 
 
 def _note_step(run: _Run, progress: Progress) -> None:
-    run.steps[progress.title.id] = RunStep(
-        number=progress.number, of=progress.of, title=progress.title, detail=progress.detail
-    )
+    run.steps[progress.title.id] = RunStep(**progress._asdict())
 
 
 def _run_view(run: _Run) -> CalibrationRunView:

@@ -1,6 +1,6 @@
 """Noise between two frames of the same scene: pixel noise, streaks, row and frame offsets, slow drift of light.
 
-Levels are measured on real frames (`station.twin.digit.fit`). The real pixel noise is blotchy (colour is sampled
+Levels are measured on real frames (`benchmarks.twin.fit`). The real pixel noise is blotchy (colour is sampled
 at half the resolution and compressed): neighbours correlate as after a Gaussian blur of the widths below, and
 the channels as given. Pixel noise is cut from a bank of fields made once, at random places, since drawing nearly
 a million normal deviates per frame would cost more than all the rest.
