@@ -125,7 +125,7 @@ def shifts(recipe: Recipe, draft: Draft, true_mm: float) -> str:
         verification = asyncio.run(procedure.run()).verification
         passed += verification.passed
         ratios.append(abs((verification.area_ratio or 0.0) - 1.0))
-        contrasts.append(abs((figures.contrast_ratio(verification.curve, calibration.curve) or 0.0) - 1.0))
+        contrasts.append(abs((figures.ratio(verification.curve, calibration.curve, "contrast_levels") or 0.0) - 1.0))
         onsets.append(abs((verification.onset_mm or 0.0) - calibration.onset_mm))
     rows = [
         f"| the ball's area | {max(ratios):.1%} | {settings.area_tolerance:.0%} |",

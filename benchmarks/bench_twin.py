@@ -21,14 +21,7 @@ import psutil
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
-
-from station.devices.camera.health import FrameHealth
-from station.devices.camera.twin import TwinCamera
-from station.memory import keep_freed_memory
-from station.settings.camera import CameraSettings, TwinCameraSettings
-from station.settings.segmentation import PaperParameters
-from station.twin.clock import SteadyClock
-from station.twin.digit.fit import (
+from twin.fit import (
     PRESS_GAP_S,
     SMOOTHING_MM,
     Press,
@@ -37,12 +30,19 @@ from station.twin.digit.fit import (
     free_of_contact,
     read_presses,
 )
+from twin.statistics import measure_noise
+
+from station.devices.camera.health import FrameHealth
+from station.devices.camera.twin import TwinCamera
+from station.memory import keep_freed_memory
+from station.settings.camera import CameraSettings, TwinCameraSettings
+from station.settings.segmentation import PaperParameters
+from station.twin.clock import SteadyClock
 from station.twin.digit.optics import Optics
 from station.twin.digit.press import PressOptions, render_press
 from station.twin.digit.sensor import DigitSensor, Image
 from station.twin.digit.server import DigitCameraServer, digit_faults
 from station.twin.digit.spoil import FRAME_FAULTS, spoiled
-from station.twin.digit.statistics import measure_noise
 from station.twin.fruit import Kind, draw_fruit
 from station.twin.gel import SENSOR_SHAPE, Gel
 from station.twin.world import DIGIT_MM, World

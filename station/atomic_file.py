@@ -16,7 +16,6 @@ def write_atomically(
 
     Args:
         path: in an existing folder.
-        data: the new content.
         mode: the new file's permissions, exactly; by default those that the process's umask leaves.
         owner: user and group of the new file; the process's own by default.
         durable: wait for the disk; without it a loss of power may bring the old content back, or an empty file.

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import functools
 import os
 import shutil
 import signal
@@ -19,6 +20,8 @@ import psutil
 import pytest
 from hypothesis import HealthCheck, settings
 from threadpoolctl import threadpool_limits
+
+from station.cli import main
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 GRACE_S = 3.0
@@ -169,7 +172,37 @@ def real_images() -> Path:
 
 
 @pytest.fixture
-def analyze() -> Callable[..., subprocess.CompletedProcess[str]]:
+def station_here(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run the command line as its program does, in this process: to load it anew takes longer than what it does."""
+
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+        command = ["station", *map(str, arguments)]
+        monkeypatch.setattr(sys, "argv", command)
+        capfd.readouterr()
+        mask = os.umask(0o022)
+        try:
+            with pytest.raises(SystemExit) as ended:
+                main()
+        finally:
+            os.umask(mask)
+        assert isinstance(ended.value.code, int)
+        return subprocess.CompletedProcess(command, ended.value.code, *capfd.readouterr())
+
+    return run
+
+
+@pytest.fixture
+def analyze(
+    station_here: Callable[..., subprocess.CompletedProcess[str]],
+) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run `station analyze` in this process."""
+    return functools.partial(station_here, "analyze")
+
+
+@pytest.fixture
+def analyze_apart() -> Callable[..., subprocess.CompletedProcess[str]]:
     """Run `station analyze` as a user does."""
 
     def run(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:

@@ -12,12 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from station.twin.contact import Mask, Pose
-from station.twin.digit.codec import Codec, as_jpeg, as_video
+from station.twin.digit.codec import as_jpeg
 from station.twin.digit.loaded import band_share
 from station.twin.digit.sensor import Condition, DigitSensor, Image
 from station.twin.gel import MM_PER_PX, SENSOR_SHAPE
-from station.twin.soft.body import SoftKind, draw_soft_body
-from station.twin.soft.contact import SoftOnGel
+
+from .soft.body import SoftKind, draw_soft_body
+from .soft.contact import SoftOnGel
+from .video import Codec, with_video
 
 KINDS = tuple(str(kind) for kind in SoftKind)
 FILLING = (SoftKind.SOFT_BALL, SoftKind.FOAM, SoftKind.COARSE_FRUIT, SoftKind.SMOOTH_FRUIT)
@@ -130,17 +132,6 @@ def with_jpeg(images: Sequence[Image], quality: int) -> list[Image]:
         quality: 1 to 100; files from the web have 30 to 60.
     """
     return [as_jpeg(image, quality) for image in images]
-
-
-def with_video(images: Sequence[Image], codec: Codec = "mp4v", quality: int | None = None) -> list[Image]:
-    """The images after a video file.
-
-    Args:
-        images: any frames, in order; put the references first, so that they are coded with the press.
-        codec: see `station.twin.digit.codec.as_video`.
-        quality: likewise.
-    """
-    return as_video(images, codec, quality)
 
 
 def press_with_jpeg(press: SoftPress, quality: int) -> SoftPress:

@@ -22,7 +22,6 @@ def make_backup(layout: Layout, release: Path, kind: str) -> Path:
     """Back up records, state and configuration into a new folder; the station may run meanwhile.
 
     Args:
-        layout: the installation.
         release: its program backs up the records.
         kind: the first part of the folder's name.
 
@@ -53,7 +52,6 @@ def prune(layout: Layout, kind: str, keep: int) -> None:
     """Remove all backups of a kind but the newest.
 
     Args:
-        layout: the installation.
         kind: as for `make_backup`.
         keep: number of remaining ones.
     """

@@ -13,7 +13,6 @@ def try_with(layout: Layout, release: Path) -> tuple[str, ...]:
     """Check on a copy whether the configuration is valid in a release.
 
     Args:
-        layout: the installation.
         release: the next one.
 
     Returns:

@@ -30,9 +30,7 @@ def wait_until_well(layout: Layout, release: Path, version: str, *, was_ready: b
     Args:
         layout: its configuration has the station's address.
         release: the started one.
-        version: the expected one.
         was_ready: whether the one before it would have accepted a trigger.
-        limit_s: maximum wait.
 
     Raises:
         Failed: it is not healthy by then; with its report.

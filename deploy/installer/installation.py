@@ -27,9 +27,7 @@ class Installation:
     """One run of the installer.
 
     Args:
-        layout: the place.
         services: of the same system.
-        source: the release's source.
         packages: source of the packages.
         limit_s: time for the station to become healthy.
     """

@@ -23,10 +23,7 @@ def run(
     """Run a program to its end.
 
     Args:
-        command: the program and its arguments.
         environment: its environment; the installer's own by default.
-        folder: the working folder.
-        limit_s: its time limit.
 
     Returns:
         Its output.
@@ -56,7 +53,6 @@ def station(layout: Layout, release: Path, *arguments: str | Path, limit_s: floa
         layout: its configuration and state are used.
         release: its program is used.
         arguments: as after `station`.
-        limit_s: as for `run`.
 
     Raises:
         Failed: as for `run`.

@@ -92,8 +92,6 @@ def make(layout: Layout, source: Source, packages: Packages) -> Path:
     """Build the release of a source, unless it is there. An incomplete one is built again.
 
     Args:
-        layout: the place.
-        source: the release's source.
         packages: source of the packages.
 
     Raises:

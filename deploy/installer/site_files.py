@@ -62,7 +62,6 @@ def make_folders(layout: Layout, shipped: Path) -> None:
     """Create the folders of configuration, state and backups; a missing configuration file with the site's recipes.
 
     Args:
-        layout: the installation.
         shipped: folder of the shipped recipes, from which a new site's are copied.
     """
     for path, user in ((layout.settings, "root"), (layout.home, NAME), (layout.backups, NAME)):
@@ -120,7 +119,6 @@ def remove_folders(layout: Layout, folders: list[str]) -> None:
     """Remove created folders that are empty.
 
     Args:
-        layout: where.
         folders: as in the manifest.
     """
     for path in sorted(set(folders), key=len, reverse=True):

@@ -3,12 +3,9 @@
 from datetime import UTC, datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from hmi.past.past import FullRecord, Summary, judged_of
-from station.channel.panel import ListedAlarm
-from station.channel.panel_maintenance_queries import PartHealth
-from station.channel.panel_queries import LotView
+from hmi.past.past import FullRecord, judged_of
 from station.messages.message import Message
 from station.vocabulary import OutcomeName
 
@@ -18,9 +15,20 @@ Grower = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[^\x00-\x1
 
 
 class Model(BaseModel):
-    """Base model that refuses unknown fields."""
+    """Base model that refuses unknown fields; made of the station's own answers by their attributes."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, from_attributes=True)
+
+
+def moment(utc_ms: int) -> datetime:
+    """Convert a time of the station's, ms since 1970."""
+    return datetime.fromtimestamp(utc_ms / 1000, UTC)
+
+
+Moment = Annotated[datetime, BeforeValidator(moment)]
+"""From a time of the station's."""
+Sentence = Annotated[str, BeforeValidator(lambda message: str(message or ""))]
+"""Of a message of the station's; empty for none."""
 
 
 class ApiMessage(Model):
@@ -38,6 +46,10 @@ class ApiMessage(Model):
         return cls(id=message.id, parameters=message.parameters, text=str(message))
 
 
+Said = Annotated[ApiMessage, BeforeValidator(ApiMessage.of)]
+"""From a message of the station's."""
+
+
 class Error(Model):
     """The reason of a refused request."""
 
@@ -51,31 +63,18 @@ class Part(Model):
     name: str
     state: Literal["ok", "degraded", "fault", "unknown"]
     age_s: float | None = Field(description="Since it was last heard.")
-    detail: str = Field(description="The observation; empty where ok.")
-    remedy: str = Field(description="What to do; empty where ok.")
-    detail_message: ApiMessage | None
-    remedy_message: ApiMessage | None
-
-    @classmethod
-    def of(cls, part: PartHealth) -> "Part":
-        """Convert the station's answer."""
-        return cls(
-            name=part.name,
-            state=part.state,
-            age_s=part.age_s,
-            detail=str(part.detail or ""),
-            remedy=str(part.remedy or ""),
-            detail_message=part.detail and ApiMessage.of(part.detail),
-            remedy_message=part.remedy and ApiMessage.of(part.remedy),
-        )
+    detail: Sentence = Field(description="The observation; empty where ok.")
+    remedy: Sentence = Field(description="What to do; empty where ok.")
+    detail_message: Said | None = Field(validation_alias="detail")
+    remedy_message: Said | None = Field(validation_alias="remedy")
 
 
 class HealthAnswer(Model):
     """Readiness of the station, and the state of each of its parts."""
 
     ready: bool = Field(description="A trigger would be accepted now.")
-    why: str = Field(description="Why not, with the remedy; empty where ready.")
-    why_message: ApiMessage | None
+    why: Sentence = Field(description="Why not, with the remedy; empty where ready.")
+    why_message: Said | None = Field(validation_alias="why")
     mode: int = Field(description="PackML: 1 production, 2 maintenance, 3 manual.")
     simulated: bool
     parts: list[Part]
@@ -90,27 +89,11 @@ class AlarmAnswer(Model):
     priority: Literal["critical", "high", "medium", "low"]
     state: str
     active: bool = Field(description="Its cause is there, or it is latched, and it is not shelved.")
-    since: datetime
-    cause: ApiMessage
-    consequence: ApiMessage
-    action: ApiMessage
-    detail: ApiMessage | None = Field(description="What was seen when it was last raised.")
-
-    @classmethod
-    def of(cls, alarm: ListedAlarm) -> "AlarmAnswer":
-        """Convert the station's answer."""
-        return cls(
-            alarm=alarm.alarm,
-            number=alarm.number,
-            priority=alarm.priority,
-            state=alarm.state,
-            active=alarm.active,
-            since=moment(alarm.since_utc_ms),
-            cause=ApiMessage.of(alarm.cause),
-            consequence=ApiMessage.of(alarm.consequence),
-            action=ApiMessage.of(alarm.action),
-            detail=alarm.detail and ApiMessage.of(alarm.detail),
-        )
+    since: Moment = Field(validation_alias="since_utc_ms")
+    cause: Said
+    consequence: Said
+    action: Said
+    detail: Said | None = Field(description="What was seen when it was last raised.")
 
 
 class AlarmAnswers(Model):
@@ -124,28 +107,15 @@ class InspectionSummary(Model):
 
     sequence: int = Field(description="The inspection's number; never given twice.")
     trigger_id: int
-    began: datetime
-    duration_s: float | None
+    began: Moment = Field(validation_alias="began_utc_ms")
+    duration_s: Annotated[float | None, BeforeValidator(lambda ms: None if ms is None else ms / 1000)] = Field(
+        validation_alias="duration_ms"
+    )
     lot: str
     grower: str
     fruit: str = Field(description="The recipe's name.")
     outcome: OutcomeName | None = Field(description="Null while it runs.")
     reasons: list[str] = Field(description="The first one decided; empty only for PASS.")
-
-    @classmethod
-    def of(cls, row: Summary) -> "InspectionSummary":
-        """Convert the station's answer."""
-        return cls(
-            sequence=row.sequence,
-            trigger_id=row.trigger_id,
-            began=moment(row.began_utc_ms),
-            duration_s=None if row.duration_ms is None else row.duration_ms / 1000,
-            lot=row.lot,
-            grower=row.grower,
-            fruit=row.fruit,
-            outcome=row.outcome,
-            reasons=list(row.reasons),
-        )
 
 
 class InspectionList(Model):
@@ -267,14 +237,8 @@ class LotAnswer(Model):
 
     name: str
     grower: str
-    began: datetime
-    ended: datetime | None = Field(description="Null while it runs.")
-
-    @classmethod
-    def of(cls, reply: LotView) -> "LotAnswer":
-        """Convert the station's answer."""
-        ended = None if reply.ended_utc_ms is None else moment(reply.ended_utc_ms)
-        return cls(name=reply.name, grower=reply.grower, began=moment(reply.began_utc_ms), ended=ended)
+    began: Moment = Field(validation_alias="began_utc_ms")
+    ended: Moment | None = Field(validation_alias="ended_utc_ms", description="Null while it runs.")
 
 
 class LotList(Model):
@@ -287,8 +251,3 @@ class LotBegin(Model):
     """The data of a lot that begins."""
 
     grower: Grower = Field(description="Whose fruit it is.")
-
-
-def moment(utc_ms: int) -> datetime:
-    """Convert a time of the station's, ms since 1970."""
-    return datetime.fromtimestamp(utc_ms / 1000, UTC)

@@ -9,9 +9,7 @@ from pydantic import BeforeValidator
 
 from hmi.api.access import changer, reader
 from hmi.api.model import (
-    AlarmAnswer,
     AlarmAnswers,
-    ApiMessage,
     Error,
     HealthAnswer,
     InspectionDetails,
@@ -21,7 +19,6 @@ from hmi.api.model import (
     LotBegin,
     LotList,
     LotName,
-    Part,
     RecipeDetails,
     RecipeList,
     RecipeSummary,
@@ -78,22 +75,14 @@ EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo
 async def health(hmi: HmiNow, _: Reader) -> HealthAnswer:
     """Readiness of the station, and the state of each of its parts."""
     reply = await hmi.gateway.request(GetHealth(), Health, deadline_s=DEADLINE_S)
-    return HealthAnswer(
-        ready=reply.ready,
-        why=str(reply.why or ""),
-        why_message=reply.why and ApiMessage.of(reply.why),
-        mode=reply.mode,
-        simulated=reply.simulated,
-        parts=[Part.of(part) for part in reply.parts],
-        versions=reply.versions,
-    )
+    return HealthAnswer.model_validate(reply)
 
 
 @router.get("/alarms", tags=["health"])
 async def alarms(hmi: HmiNow, _: Reader) -> AlarmAnswers:
     """Alarms that are not in their normal state."""
     reply = await hmi.gateway.request(ListAlarms(), AlarmList, deadline_s=DEADLINE_S)
-    return AlarmAnswers(alarms=[AlarmAnswer.of(alarm) for alarm in reply.alarms])
+    return AlarmAnswers.model_validate(reply)
 
 
 @router.get("/inspections", tags=["results"])
@@ -121,7 +110,7 @@ async def inspections(
         to_utc_ms=_utc_ms(begun_to),
     )
     page = await hmi.past.find(search, limit, below)
-    return InspectionList(inspections=[InspectionSummary.of(row) for row in page.rows], below=page.below)
+    return InspectionList(inspections=[InspectionSummary.model_validate(row) for row in page.rows], below=page.below)
 
 
 @router.get("/inspections/{sequence}", tags=["results"], responses=_NOT_FOUND)
@@ -153,7 +142,7 @@ async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeDetails:
 @router.get("/lots", tags=["lots"])
 async def lots(hmi: HmiNow, _: Reader, limit: Annotated[int, Query(ge=1, le=100)] = 20) -> LotList:
     """The latest lots."""
-    return LotList(lots=[LotAnswer.of(each) for each in await hmi.past.lots(limit)])
+    return LotList(lots=[LotAnswer.model_validate(each) for each in await hmi.past.lots(limit)])
 
 
 @router.get("/lots/{name}", tags=["lots"], responses=_NOT_FOUND)
@@ -162,14 +151,14 @@ async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAn
     found = await hmi.past.lots(name=name)
     if not found:
         raise HTTPException(404, f"nobody told of a lot {name}")
-    return LotAnswer.of(found[0])
+    return LotAnswer.model_validate(found[0])
 
 
 @router.put("/lots/{name}", tags=["lots"], responses=_UNREADABLE)
 async def begin_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()], begin: LotBegin) -> LotAnswer:
     """Begin a lot, by the name that the PLC gives with each trigger. Idempotent."""
     query = StartLot(name=name, grower=begin.grower, actor=actor)
-    return LotAnswer.of(await hmi.gateway.request(query, LotView, deadline_s=DEADLINE_S))
+    return LotAnswer.model_validate(await hmi.gateway.request(query, LotView, deadline_s=DEADLINE_S))
 
 
 @router.post("/lots/{name}/end", tags=["lots"], responses=_NOT_FOUND)
@@ -178,7 +167,7 @@ async def end_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path(
     if not await hmi.past.lots(name=name):
         raise HTTPException(404, f"nobody told of a lot {name}; tell of its begin first")
     query = EndLot(name=name, actor=actor)
-    return LotAnswer.of(await hmi.gateway.request(query, LotView, deadline_s=DEADLINE_S))
+    return LotAnswer.model_validate(await hmi.gateway.request(query, LotView, deadline_s=DEADLINE_S))
 
 
 def _short(state: RecipeState) -> dict[str, Any]:

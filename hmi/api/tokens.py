@@ -81,7 +81,6 @@ class ApiTokens:
 
         Args:
             name: the owner, for the audit trail.
-            role: the token's role.
             days: how long it is valid; None until it is removed.
 
         Raises:

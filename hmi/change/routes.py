@@ -136,7 +136,6 @@ def changes(now: RecipeSummary | None, then: RecipeSummary, locale: Locale) -> l
     Args:
         now: the active recipe.
         then: the selected recipe.
-        locale: for numbers.
     """
     before, after = {} if now is None else _values(now, locale), _values(then, locale)
     lines = [Change(key, before.get(key, NO_VALUE), value) for key, value in after.items()]

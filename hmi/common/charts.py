@@ -24,10 +24,8 @@ def area_over_closing(
     Args:
         curves: drawn in this order.
         limits: in ascending order of closing.
-        locale: the language.
         label: what the chart shows, for who cannot see it.
         early_stop_mm2: the early stop's area; None for none.
-        size: of the drawing.
     """
     closing, area, early, limit = (locale.text(f"chart.{name}") for name in ("closing", "area", "early", "limit"))
     texts = Texts(label, closing, area, early, limit)

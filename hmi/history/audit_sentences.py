@@ -32,9 +32,7 @@ def sentence(row: AuditRow, fruit: Mapping[int, str], locale: Locale) -> Sentenc
     """Write a row as a sentence.
 
     Args:
-        row: of the trail.
         fruit: titles of the recipes by their PLC numbers.
-        locale: the reader's.
     """
     old, new = _mapping(row.old), _mapping(row.new)
     argument = new.get("argument", 0)

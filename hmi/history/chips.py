@@ -31,7 +31,6 @@ def chips(terms: Terms, lot: str | None, today: datetime) -> list[Chip]:
     """Return the chips; each leaves the other conditions as they are.
 
     Args:
-        terms: the present search.
         lot: the current lot; None or empty for none.
         today: local time now.
     """

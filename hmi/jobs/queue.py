@@ -96,7 +96,6 @@ class Jobs:
     """Queue that runs one job after the other.
 
     Args:
-        home: the station's home folder.
         command: the command line that gets the arguments.
     """
 

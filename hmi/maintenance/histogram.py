@@ -9,8 +9,6 @@ def histogram(counts: Sequence[int], wide: float = 256.0, high: float = 80.0) ->
 
     Args:
         counts: pixels a bin.
-        wide: width of the picture.
-        high: height of the picture.
     """
     largest = math.sqrt(max(counts, default=0)) or 1.0
     gap = wide / max(1, len(counts) - 1)

@@ -5,11 +5,13 @@ cycle nothing but a share of the processor.
 """
 
 import io
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import NamedTuple, Self, TypeVar
 
 import cv2
+from sqlalchemy import Connection
 
 from hmi.past.pictures import Stages, read_image, read_stages
 from hmi.past.recipes import PastRecipes
@@ -30,6 +32,7 @@ from station.settings.configuration import Configuration
 from station.settings.recipe_model import Recipe
 from station.support.bundle import bundle
 
+T = TypeVar("T")
 _ALARM_ROWS = {str(alarm): row for alarm, row in ALARMS.items()}
 
 __all__ = [
@@ -62,9 +65,6 @@ class Past:
     """Reader of the records.
 
     Each method raises `RecordsError` if they cannot be read, and `PanelBusyError` if too many wait or one takes 20 s.
-
-    Args:
-        site: the configuration in force.
     """
 
     def __init__(self, site: Configuration) -> None:
@@ -84,12 +84,7 @@ class Past:
         Args:
             below: of the page before; None for the first.
         """
-
-        def read() -> Page:
-            with reading(self._folder) as connection:
-                return find_page(connection, Query(**dict(search)), limit, below)
-
-        return await self._worker.do(read)
+        return await self._read(lambda connection: find_page(connection, Query(**dict(search)), limit, below))
 
     async def inspection(self, sequence: int) -> FullRecord:
         """Return one inspection in full, with those of its images whose files still exist.
@@ -98,21 +93,15 @@ class Past:
             UnknownInspectionError: there is no record of it.
         """
 
-        def read() -> FullRecord:
-            with reading(self._folder) as connection:
-                record = read_inspection(connection, sequence, self._folder)
+        def read(connection: Connection) -> FullRecord:
+            record = read_inspection(connection, sequence, self._folder)
             return replace(record, images=tuple(image for image in record.images if Path(image.path).is_file()))
 
-        return await self._worker.do(read)
+        return await self._read(read)
 
-    async def lots(self, limit: int = 20, name: str | None = None) -> tuple[LotView, ...]:
+    async def lots(self, limit: int = 20, name: str | None = None) -> list[LotView]:
         """Return the latest lots, newest first, or the one of a name."""
-
-        def read() -> tuple[LotView, ...]:
-            with reading(self._folder) as connection:
-                return tuple(LotView(**lot._asdict()) for lot in read_lots(connection, limit, name=name))
-
-        return await self._worker.do(read)
+        return await self._read(lambda connection: read_lots(connection, limit, name=name))
 
     async def audit(self, limit: int, action: str = "", subject: str = "") -> list[AuditRow]:
         """Return the latest rows of the audit trail, newest first.
@@ -121,21 +110,11 @@ class Past:
             action: of this action, or of all that begin so.
             subject: with this text in their subject.
         """
-
-        def read() -> list[AuditRow]:
-            with reading(self._folder) as connection:
-                return read_audit(connection, limit, action, subject)[::-1]
-
-        return await self._worker.do(read)
+        return await self._read(lambda connection: read_audit(connection, limit, action, subject)[::-1])
 
     async def alarm_changes(self, limit: int) -> list[AlarmChange]:
         """Return the latest changes of alarms, newest first."""
-
-        def read() -> list[AlarmChange]:
-            with reading(self._folder) as connection:
-                return [_alarm_change(entry) for entry in read_alarm_log(connection, limit)]
-
-        return await self._worker.do(read)
+        return await self._read(lambda connection: list(map(_alarm_change, read_alarm_log(connection, limit))))
 
     async def image(self, sha256: str) -> bytes:
         """Return one stored image, a PNG file."""
@@ -158,6 +137,13 @@ class Past:
             return file.getvalue()
 
         return await self._worker.do(write)
+
+    async def _read(self, query: Callable[[Connection], T]) -> T:
+        def read() -> T:
+            with reading(self._folder) as connection:
+                return query(connection)
+
+        return await self._worker.do(read)
 
 
 def _alarm_change(entry: AlarmEntry) -> AlarmChange:

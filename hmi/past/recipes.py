@@ -68,7 +68,6 @@ class PastRecipes:
     """Reader of the recipes, with the errors of `Past`; a `BadInputError` says that there is no such revision or file.
 
     Args:
-        home: the station's home folder.
         folder: the site's recipe files; None for the shipped ones.
     """
 

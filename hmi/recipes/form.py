@@ -92,7 +92,6 @@ def parsed(field: Field, text: str) -> Any:
     """Parse a field's typed text.
 
     Args:
-        field: which.
         text: with a decimal comma or point.
 
     Raises:
@@ -121,7 +120,6 @@ def formatted(field: Field, decimal: str) -> str:
     """Format a field's value for typing.
 
     Args:
-        field: which.
         decimal: the language's decimal sign.
     """
     match field.value:

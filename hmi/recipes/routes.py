@@ -30,6 +30,7 @@ from station.channel.panel_recipe_orders import (
     ApproveRecipe,
     ImportedRecipe,
     ImportRecipe,
+    RecipeOrder,
     RejectRecipe,
     RevertRecipe,
     SaveDraft,
@@ -106,7 +107,7 @@ async def save(
     try:
         changes = changed(values, typed)
     except BadFieldError as error:
-        why = locale.text("recipes.bad_field", field=_title(locale, error.field.key, error.field.title),
+        why = locale.text("recipes.bad_field", field=locale.own(error.field.key, error.field.title),
                            expected=locale.sentence(error.field.expected))  # fmt: skip
         return await _form(request, hmi, locale, name, typed, why, reason)
     if not changes:
@@ -205,7 +206,7 @@ async def whatif(hmi: HmiNow, name: Name, last: Annotated[int, Form(ge=1, le=100
     return go_to(f"/jobs/{job.id}?back=/recipes/{name}")
 
 
-async def _order(hmi: Hmi, order: SubmitRecipe | ApproveRecipe | RejectRecipe | RevertRecipe) -> Response:
+async def _order(hmi: Hmi, order: RecipeOrder) -> Response:
     await hmi.gateway.request(order, Noted, deadline_s=DEADLINE_S)
     return go_to(f"/recipes/{order.name}")
 
@@ -238,15 +239,11 @@ async def _form(
         wrong=wrong,
         reason=reason,
         drawn=await _drawn(hmi, locale, stored, values),
-        title=lambda each: _title(locale, each.key, each.title),
+        title=lambda each: locale.own(each.key, each.title),
         reply=known,
         editable=known.editable and caller_of(request).may(Right.EDIT_RECIPES),
         tab="edit",
     )
-
-
-def _title(locale: Locale, key: str, english: str) -> str:
-    return locale.own(key, english)
 
 
 def _typed(texts: Mapping[str, str]) -> dict[str, str]:

@@ -31,12 +31,7 @@ class Step(NamedTuple):
 
 
 def steps(state: PanelState, recent: Recent) -> tuple[Step, ...]:
-    """Return all steps, in the order in which they are done.
-
-    Args:
-        state: of the station.
-        recent: the latest fruit.
-    """
+    """Return all steps, in the order in which they are done."""
     found = tuple(_found(state, recent))
     left = [name for name, done, _ in found if not done]
     waiting = {name: tuple(each for each in _NEEDS.get(name, ()) if each in left) for name in left}

@@ -47,7 +47,6 @@ def make_context(site: Configuration, file: Path | None) -> Hmi:
     """Make the parts that all pages use; the gateway is not entered yet.
 
     Args:
-        site: the site's configuration.
         file: it was read from; None for none.
 
     Raises:

@@ -48,11 +48,7 @@ class Assets:
         return f"/static/{self._files[name].digest}/{name}"
 
     def serve(self, request: Request) -> Response:
-        """Answer `/static/{digest}/{name}`.
-
-        Args:
-            request: the browser's.
-        """
+        """Answer `/static/{digest}/{name}`."""
         found = self._files.get(request.path_params["name"])
         if found is None or found.digest != request.path_params["digest"]:
             return Response(status_code=404)

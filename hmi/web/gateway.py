@@ -81,8 +81,6 @@ class Gateway:
         """Send a request to the station and return its answer.
 
         Args:
-            request: a message of the panel's channel.
-            reply: the type of its answer.
             deadline_s: how long to wait in all.
 
         Raises:

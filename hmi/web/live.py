@@ -47,10 +47,7 @@ class Live:
 
     Args:
         parts: by their names, `page.what`.
-        renderer: renders the templates.
-        gateway: state of the station.
         boot: differs after each start of this process; then a page reloads itself.
-        places: of the streams.
     """
 
     def __init__(
@@ -70,8 +67,6 @@ class Live:
         """Return a part's present content.
 
         Args:
-            name: a known one.
-            locale: the language.
             role: of the reader; an order within the part has no token, which the page's script fills in.
         """
         part = self._parts[name]
@@ -92,8 +87,6 @@ class Live:
 
         Args:
             stream: gets its place with the first event, and leaves it with the last.
-            names: the page's parts.
-            locale: its language.
             caller: returns who is logged in there now; the page reloads itself when that changes.
         """
         self.places.enter(stream)

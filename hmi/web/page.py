@@ -18,9 +18,7 @@ def show(request: Request, template: str, *, status: int = 200, **values: Any) -
     """Answer with a page.
 
     Args:
-        request: the browser's.
         template: extends `base.html.j2`.
-        status: HTTP status.
         values: the page's own, in addition to those of every page: `caller`, `Right`, `state` (the station's, or None),
             `token()` for a form, and `live(name)`, which inserts a live part.
     """

@@ -5,7 +5,6 @@ class Problem(Exception):  # noqa: N818 (the pages' term)
     """A refusal with a text of the catalogue; rendered as a page, and as JSON below `/api/`.
 
     Args:
-        status: of HTTP.
         key: of the catalogue, `problem.what`.
         values: values for the text's braces; of a role, `role` is its name in the language.
     """

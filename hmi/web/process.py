@@ -30,7 +30,6 @@ async def serve(site: Configuration, file: Path | None) -> None:
     """Serve the pages until SIGINT or SIGTERM.
 
     Args:
-        site: the site's configuration.
         file: it was read from; None for none.
 
     Raises:

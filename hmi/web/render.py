@@ -16,9 +16,6 @@ class Renderer:
 
     In every template: `t(key, **values)` a text of the catalogue, `w` the `Locale` with numbers and times,
     `static(name)` a file's address.
-
-    Args:
-        assets: the pages' scripts and styles.
     """
 
     def __init__(self, assets: Assets) -> None:
@@ -38,8 +35,6 @@ class Renderer:
 
         Args:
             template: its file name.
-            locale: the language.
-            values: the template's values.
 
         Raises:
             jinja2.UndefinedError: a value is missing.

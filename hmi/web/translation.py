@@ -128,7 +128,6 @@ class Locale:
         """Return a text; in English if the language has none, which a test refuses.
 
         Args:
-            key: its id.
             values: for the text's braces; the one that decides between its forms is a number.
 
         Raises:

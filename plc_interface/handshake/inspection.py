@@ -7,20 +7,17 @@ from plc_interface.handshake.events import BeginAnswered, Moment
 from plc_interface.handshake.journal import Running
 from plc_interface.handshake.modes import Inspection, Signal
 from plc_interface.handshake.outcomes import is_sound, no_result, publish_if_other, publish_own, queue
-from plc_interface.handshake.state import PendingTrigger
 from plc_interface.handshake.trigger import note_refusal
 from plc_interface.handshake.work import Work, row
-from station.channel.line import BeginReply, Reason, Refusal
+from station.channel.line import BeginReply, Reason, Refusal, StationState
 
 
 def request_begin(work: Work) -> None:
     """`Begin` to the station."""
     state = work.state
-    number = work.number()
-    state.pending = pending = PendingTrigger(
-        number, state.inputs.trigger_id, state.inputs.encoder, state.journal.lot, work.size
-    )
-    work.actions.append(RequestBegin(number, pending.trigger_id, pending.encoder, pending.lot, *pending.size))
+    inputs = state.inputs
+    state.pending = RequestBegin(work.number(), inputs.trigger_id, inputs.encoder, state.journal.lot, *work.size)
+    work.actions.append(state.pending)
 
 
 def is_new(work: Work) -> bool:
@@ -42,43 +39,34 @@ def accept(work: Work) -> None:
     work.signals.append(Signal.ACCEPTED)
 
 
-def run(work: Work, sequence: int, pending: PendingTrigger, deadline_s: float) -> None:
+def run(work: Work, sequence: int, pending: RequestBegin, deadline_s: float) -> None:
     """Register an inspection as running, with the interface's own deadline behind the station's."""
     state, station = work.state, work.state.station
     within_s = deadline_s + work.settings.result_margin_s
     state.pending = None
-    state.running = Running(
-        sequence=sequence,
-        trigger_id=pending.trigger_id,
-        encoder=pending.encoder,
-        lot=pending.lot,
-        **pending.size._asdict(),
-        within_s=within_s,
-        began_s=work.at.s,
-        began_utc_ms=work.at.utc_ms,
-        recipe_number=station.recipe_number if station else 0,
-        recipe_checksum=station.recipe_checksum if station else 0,
-        simulated=station.simulated if station else False,
-    )
+    state.running = running(pending, sequence, work.at, within_s, station)
     work.update_journal(accepted_id=pending.trigger_id, highest=sequence)
     work.start(Signal.RESULT_DEADLINE, within_s)
     work.actions.append(RequestOutcome(sequence, within_s))
 
 
-def unknown_run(pending: PendingTrigger, sequence: int, at: Moment) -> Running:
-    """Make an inspection of which only sequence and trigger id are known."""
+def running(
+    pending: RequestBegin, sequence: int, at: Moment, within_s: float = 0.0, station: StationState | None = None
+) -> Running:
+    """Make an inspection that began now, by the station's recipe as far as it is known."""
     return Running(
         sequence=sequence,
         trigger_id=pending.trigger_id,
         encoder=pending.encoder,
         lot=pending.lot,
-        **pending.size._asdict(),
-        within_s=0.0,
+        fruit_length_mm_x10=pending.fruit_length_mm_x10,
+        size_class=pending.size_class,
+        within_s=within_s,
         began_s=at.s,
         began_utc_ms=at.utc_ms,
-        recipe_number=0,
-        recipe_checksum=0,
-        simulated=False,
+        recipe_number=station.recipe_number if station else 0,
+        recipe_checksum=station.recipe_checksum if station else 0,
+        simulated=station.simulated if station else False,
     )
 
 

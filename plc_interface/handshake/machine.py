@@ -18,9 +18,7 @@ def step(before: State, event: Event, settings: HandshakeSettings) -> tuple[Stat
     Timers that ran out before the event are handled first, then the event. `before` is not changed.
 
     Args:
-        before: the state so far.
         event: with its time, which never goes back.
-        settings: time-outs and deadlines.
     """
     work = Work(copy.copy(before), event.at, event, settings)
     while (due := _due(work)) is not None:

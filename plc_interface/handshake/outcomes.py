@@ -17,31 +17,21 @@ def no_result(running: Running, at: Moment, *reasons: Reason) -> Outcome:
     """Make NO_RESULT for an inspection whose outcome the station did not give, or not in time.
 
     Args:
-        running: the known data of the inspection.
         at: the inspection's end.
         reasons: LATE marks the outcome as late.
     """
     return Outcome(
-        sequence=running.sequence,
-        trigger_id=running.trigger_id,
+        **running.model_dump(exclude={"within_s", "began_s"}),
         outcome="NO_RESULT",
         reasons=reasons,
         late=Reason.LATE in reasons,
         partial=True,
-        simulated=running.simulated,
         area_mm2=None,
         area_px=None,
         closing_mm=None,
         confidence=None,
-        recipe_number=running.recipe_number,
-        recipe_checksum=running.recipe_checksum,
-        began_utc_ms=running.began_utc_ms,
         ended_utc_ms=at.utc_ms,
         duration_ms=max(0, min(round(1000 * (at.s - running.began_s)), 2**32 - 1)),
-        encoder=running.encoder,
-        lot=running.lot,
-        fruit_length_mm_x10=running.fruit_length_mm_x10,
-        size_class=running.size_class,
     )
 
 

@@ -1,8 +1,8 @@
 """Resynchronisation after a start or a lost connection: the station's open inspections against the PLC's."""
 
-from plc_interface.handshake.actions import NotifyPublished, RequestOutcome
+from plc_interface.handshake.actions import NotifyPublished, RequestBegin, RequestOutcome
 from plc_interface.handshake.events import OpenAnswered
-from plc_interface.handshake.inspection import run, unknown_run
+from plc_interface.handshake.inspection import run, running
 from plc_interface.handshake.modes import Signal
 from plc_interface.handshake.outcomes import (
     acknowledge,
@@ -14,7 +14,7 @@ from plc_interface.handshake.outcomes import (
     publish_own,
     queue,
 )
-from plc_interface.handshake.state import NO_SIZE, PendingTrigger
+from plc_interface.handshake.state import NO_SIZE
 from plc_interface.handshake.work import Work
 from station.channel.line import Open, Outcome, Reason
 
@@ -68,7 +68,7 @@ def _resynchronise_outcome(work: Work, outcome: Outcome, *, known: bool) -> None
 
 def _resynchronise_running(work: Work, sequence: int, trigger_id: int, *, known: bool) -> None:
     state, journal = work.state, work.state.journal
-    pending = PendingTrigger(0, trigger_id, 0, journal.lot, NO_SIZE)
+    unknown = RequestBegin(0, trigger_id, 0, journal.lot, *NO_SIZE)
     if state.running is not None and sequence == state.running.sequence:
         work.actions.append(RequestOutcome(sequence, state.running.within_s))
     elif sequence <= journal.acknowledged:
@@ -76,10 +76,10 @@ def _resynchronise_running(work: Work, sequence: int, trigger_id: int, *, known:
     elif known or _may_be_pending(work, sequence):
         return
     elif _is_the_plcs(work, sequence, trigger_id) and state.running is None:
-        run(work, sequence, pending, RESUMED_DEADLINE_S)
+        run(work, sequence, unknown, RESUMED_DEADLINE_S)
         work.signals.append(Signal.RESUMED_RUN)
     else:
-        hide(work, no_result(unknown_run(pending, sequence, work.at), work.at, Reason.STATION_LOST))
+        hide(work, no_result(running(unknown, sequence, work.at), work.at, Reason.STATION_LOST))
 
 
 def _may_be_pending(work: Work, sequence: int) -> bool:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, NamedTuple
 
+from plc_interface.handshake.actions import RequestBegin
 from plc_interface.handshake.events import Inputs, Moment
 from plc_interface.handshake.journal import COMMAND_RESULT, Journal, Running
 from plc_interface.handshake.modes import Arming, Command, Inspection, Link, Lot, Mode, Result, Service, Signal, Trigger
@@ -41,17 +42,6 @@ class Size(NamedTuple):
 
 
 NO_SIZE = Size()
-
-
-@dataclass(frozen=True, slots=True)
-class PendingTrigger:
-    """A trigger whose acceptance by the station is pending."""
-
-    number: int
-    trigger_id: int
-    encoder: int
-    lot: str
-    size: Size
 
 
 COUNTERS = (
@@ -120,7 +110,8 @@ class State:
     """Whether the line's output can divert a fruit; if not, no inspection is started."""
 
     # inspections
-    pending: PendingTrigger | None = None
+    pending: RequestBegin | None = None
+    """Of the trigger whose acceptance by the station is pending."""
     running: Running | None = None
     queue: tuple[Outcome, ...] = ()
     """Not acknowledged, in order of sequence; the first one is published."""

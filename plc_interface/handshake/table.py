@@ -30,12 +30,7 @@ for _region, _rows in REGIONS.items():
 
 
 def apply(work: Work, signal: Signal) -> None:
-    """Apply a signal to every region that has a row for it; a pair without a row changes nothing.
-
-    Args:
-        work: the step in progress.
-        signal: the input.
-    """
+    """Apply a signal to every region that has a row for it; a pair without a row changes nothing."""
     for region in _CONCERNED[signal]:
         mode = work.state.mode(region)
         for row in _ROWS.get((region, mode, signal), ()):

@@ -200,7 +200,6 @@ def make_output(settings: CanSettings, folder: Path) -> LineOutput:
     """Make the outputs that the settings name.
 
     Args:
-        settings: of the line's CAN.
         folder: the journal's, which holds the pending rejects.
     """
     return RejectGate(settings, folder) if settings.enabled else NoOutput()

@@ -38,7 +38,6 @@ class LineDisplay:
     """Display of a line's fruit.
 
     Args:
-        console: the terminal.
         summary: of the line, updated while it runs.
         sketch: draws each result's curve, if the caller can read it.
     """

@@ -43,11 +43,7 @@ class Grader:
         self._random = random.Random(seed)  # noqa: S311 (a simulation)
 
     def length_mm_x10(self, true_mm: float) -> int:
-        """Return the measured length, tenths of a millimetre.
-
-        Args:
-            true_mm: the fruit's length.
-        """
+        """Return the measured length, tenths of a millimetre."""
         return round(10 * (true_mm + self._random.uniform(-GRADER_ERROR_MM, GRADER_ERROR_MM)))
 
 

@@ -111,7 +111,6 @@ class LineProgram:
     """A PLC's program for one station.
 
     Args:
-        plan: the faults to inject.
         lot: latched before the first fruit if it is not empty; at most 32 ASCII characters.
     """
 

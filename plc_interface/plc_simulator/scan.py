@@ -22,9 +22,7 @@ class Scanner:
     """One connection to the station, re-established after a loss.
 
     Args:
-        host: of the station.
         port: of its Modbus TCP.
-        unit: of the station.
         order: of the words in 32- and 64-bit values, as the station is set.
         one_round_trip: exchange by function code 23; by 16 and 3 where False.
     """

@@ -41,9 +41,7 @@ class Interface:
         """Continue from the journal.
 
         Args:
-            settings: time-outs and deadlines.
             endpoint: where the station answers.
-            image: the registers.
             journal: of the run before.
             output: receives every outcome.
         """
@@ -61,11 +59,7 @@ class Interface:
         self._publish()
 
     def start(self, statistics: Statistics) -> None:
-        """Start the requests to the station.
-
-        Args:
-            statistics: the server's counters.
-        """
+        """Start the requests to the station."""
         self._statistics = statistics
         self._wake_when_due()
         self._station.start()

@@ -78,7 +78,6 @@ class JournalFile:
         """Replace the file. A failure is logged and stored in `trouble`: the line goes on.
 
         Args:
-            journal: the new content.
             durable: wait for the disk, so that it outlives a loss of power too.
         """
         try:

@@ -26,9 +26,6 @@ log = logging.getLogger(__name__)
 async def serve(configuration: Configuration) -> None:
     """Serve until SIGINT or SIGTERM; then report offline, close the connections and return.
 
-    Args:
-        configuration: the site's.
-
     Raises:
         StationError: a port, a certificate, the journal's folder or the endpoint cannot be used.
     """

@@ -54,7 +54,6 @@ class StationLink:
 
         Args:
             endpoint: the station's.
-            settings: periods and deadlines.
             feed: receives every answer as an event.
             line: sent to the station with each beat.
         """

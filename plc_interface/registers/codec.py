@@ -65,7 +65,6 @@ def decode(register: Register, words: Sequence[int], order: WordOrder = WordOrde
     """Return the value of registers; an invalid value is returned as it is, compare it by `is_invalid`.
 
     Args:
-        register: the value's register.
         words: `register.words` numbers from 0 to 65535.
         order: of the words of a number.
 

@@ -19,7 +19,6 @@ def read_registers(image: RegisterImage, message: bytes) -> bytes:
     """Function codes 3 and 4.
 
     Args:
-        image: the registers.
         message: the PDU, from the function code on.
 
     Raises:

@@ -50,8 +50,6 @@ class RequestHandler:
         Args:
             unit: the valid unit identifier beside those of the server itself.
             image: read, and written after `on_write` agreed.
-            on_write: see `OnWrite`.
-            claim: see `Claim`.
             owns: whether a client has the right to write.
             release: called after the writer has released the right to write.
         """
@@ -69,8 +67,6 @@ class RequestHandler:
         """Return the response, from its function code on.
 
         Args:
-            peer: the client.
-            unit: the addressed unit identifier.
             message: the PDU, from the function code on; at least that one byte.
 
         Raises:

@@ -35,7 +35,6 @@ class ModbusServer:
         """Nothing is served before `start`. Made, started and stopped on one event loop.
 
         Args:
-            settings: addresses, clients and limits.
             image: the registers; commit to it on this event loop alone.
             on_write: called with whole fields, after every check and before they are in the image; may refuse them with
                 an exception code. It runs between request and response and must not wait.

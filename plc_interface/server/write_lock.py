@@ -38,7 +38,6 @@ class WriteLock:
         """Claim or renew the right to write; False if another client has it.
 
         Args:
-            peer: the claimant.
             now_s: monotonic time.
             holder_heard_s: time of the present owner's last request.
         """

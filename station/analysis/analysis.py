@@ -85,7 +85,6 @@ def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
     """Measure all images and write tables, masks, pictures and the report.
 
     Args:
-        request: images, method, folder.
         on_done: called after each image.
 
     Raises:

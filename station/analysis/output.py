@@ -92,10 +92,6 @@ class OutputFolder:
     def add(self, measured: Measured, area_mm2: float) -> None:
         """Write an image's mask, then its row as soon as the rows of all images before it are written.
 
-        Args:
-            measured: the image and its contact.
-            area_mm2: the contact area on the gel.
-
         Raises:
             BadInputError: the disk is full or the folder has become unwritable.
         """
@@ -142,9 +138,6 @@ class OutputFolder:
 
     def add_stages(self, measured: Measured) -> None:
         """Write each stage's picture of one image.
-
-        Args:
-            measured: an image measured with its stages.
 
         Raises:
             BadInputError: the disk is full or the folder has become unwritable.

@@ -72,11 +72,7 @@ class CalibrationProcedure:
     """One run. It stores nothing; when it is cancelled the jaws open.
 
     Args:
-        recipe: the ball's width steps.
-        settings: ball and limits.
         places: further places of the ball.
-        program: this program's version.
-        on_progress: called with the progress.
     """
 
     def __init__(

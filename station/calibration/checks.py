@@ -32,8 +32,6 @@ def calibration_checks(
     """Check a calibration against its limits.
 
     Args:
-        settings: ball and limits.
-        recipe: the ball's.
         steps: all of them, as measured.
         onset_mm: width of the contact onset.
         noise: of the untouched gel.
@@ -115,13 +113,11 @@ def verification_checks(
     """Check a verification against the calibration.
 
     Args:
-        settings: the tolerances.
-        calibration: the unit's.
         curve: the widths pressed now, in order of closing.
         onset_mm: width of the contact onset; None if nothing was touched.
         pixel_levels: noise of the untouched gel.
     """
-    area = figures.area_ratio(curve, calibration.curve)
+    area = figures.ratio(curve, calibration.curve, "area_px")
     fall = figures.falls(list(dropwhile(lambda point: not point.area_px, curve)))
     noise = max(now / max(was, 0.1) for now, was in zip(pixel_levels, calibration.noise.pixel_levels, strict=True))
     shift_mm = None if onset_mm is None else onset_mm - calibration.onset_mm

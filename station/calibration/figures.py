@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import combinations, pairwise
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import cv2
 import numpy as np
@@ -125,27 +125,14 @@ def judged(curve: Sequence[PressPoint], onset_mm: float, closing_mm: float) -> l
     return sorted((point for point in within if not point.cut), key=lambda point: -point.width_mm)
 
 
-def area_ratio(curve: Sequence[PressPoint], golden: Sequence[PressPoint]) -> float | None:
-    """Return the median ratio of a ball's areas to an earlier curve's at the same widths; None without common ones.
+def ratio(
+    curve: Sequence[PressPoint], golden: Sequence[PressPoint], what: Literal["area_px", "contrast_levels"]
+) -> float | None:
+    """Return the median ratio of a ball's areas, or contrasts, to an earlier curve's; None without common widths.
 
     Args:
-        curve: the new one.
-        golden: the earlier one; interpolated between its points.
+        golden: the earlier curve; interpolated between its points.
     """
-    return _ratio(curve, golden, "area_px")
-
-
-def contrast_ratio(curve: Sequence[PressPoint], golden: Sequence[PressPoint]) -> float | None:
-    """Return the same ratio of the contrast.
-
-    Args:
-        curve: the new one.
-        golden: the earlier one.
-    """
-    return _ratio(curve, golden, "contrast_levels")
-
-
-def _ratio(curve: Sequence[PressPoint], golden: Sequence[PressPoint], what: str) -> float | None:
     known = sorted((point.width_mm, getattr(point, what)) for point in golden if point.area_px)
     if len(known) < 2:
         return None

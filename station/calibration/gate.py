@@ -9,7 +9,6 @@ def gated(segmentation: Segmentation, factor: float) -> Segmentation:
     """Raise the robust method's gate in a segmentation; both limits of the gate grow alike.
 
     Args:
-        segmentation: a recipe's.
         factor: of the unit's calibration, 1 or more.
     """
     if factor <= 1.0:

@@ -49,7 +49,6 @@ class VerificationProcedure:
     Args:
         golden: the calibration's picture of the untouched gel.
         presses: the calibration's pictures of the ball, in the order of its curve.
-        on_progress: called with the progress.
     """
 
     def __init__(
@@ -107,7 +106,7 @@ class VerificationProcedure:
             calibration=self._calibration.id,
             operator=self._operator,
             passed=all(check.passed for check in checks),
-            area_ratio=figures.area_ratio(curve, self._calibration.curve),
+            area_ratio=figures.ratio(curve, self._calibration.curve, "area_px"),
             onset_mm=None if onset_mm is None else round(onset_mm, 3),
             checks=tuple(checks),
             curve=curve,
@@ -133,7 +132,7 @@ class VerificationProcedure:
 
     def _worn(self, steps: list[Step]) -> list[Finding]:
         touched = [step for step in steps if step.contact.found]
-        ratio = figures.contrast_ratio([step.point for step in touched], self._calibration.curve)
+        ratio = figures.ratio([step.point for step in touched], self._calibration.curve, "contrast_levels")
         if ratio is None or ratio >= self._settings.least_contrast:
             return []
         worn = messages.WORN(percent=100 * ratio)

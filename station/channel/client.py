@@ -72,7 +72,6 @@ class ChannelClient:
 
         Args:
             request: a server that receives it later than the deadline ignores it.
-            reply: the type of the answer.
             deadline_s: how long to wait in all.
 
         Raises:

@@ -27,10 +27,11 @@ class PartHealth(ChannelMessage):
 
     name: str
     state: Literal["ok", "degraded", "fault", "unknown"]
+    """`degraded` still inspects."""
     age_s: float | None
     """Since it was last heard; None where never."""
-    detail: Message | None
-    remedy: Message | None
+    detail: Message | None = None
+    remedy: Message | None = None
     """None only if ok."""
 
 

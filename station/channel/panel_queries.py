@@ -41,7 +41,9 @@ class LotView(ChannelMessage):
     grower: str
     began_utc_ms: int
     ended_utc_ms: int | None
+    """None while it runs."""
     revision: int
+    """Counts the changes, from 1."""
 
 
 class StartLot(ChannelMessage):

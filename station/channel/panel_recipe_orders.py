@@ -16,60 +16,53 @@ Revision = Annotated[int, Field(ge=1, le=2**31)]
 Scalar = bool | int | float | str | None
 
 
-class SaveDraft(ChannelMessage):
-    """Change values in a recipe's file, with its comments, and record it as a draft. Answered with `Noted`.
+class RecipeOrder(ChannelMessage):
+    """A person's change of one recipe. Answered with `Noted`."""
+
+    name: Name
+    reason: Why
+    actor: Actor
+
+
+class SaveDraft(RecipeOrder):
+    """Change values in a recipe's file, with its comments, and record it as a draft.
 
     Refused as a whole if the recipe would be invalid, or has changed since the author read it.
     """
 
     purpose: ClassVar[str] = "to save a draft"
-    name: Name
     values: dict[Annotated[str, Field(max_length=100)], Scalar | list[float]] = Field(min_length=1, max_length=200)
     """New values by their dotted paths, as `damage.area[0].area_mm2`."""
     base: str = Field(pattern=r"^[0-9a-f]{64}$")
     """The version that the author read."""
-    reason: Why
-    actor: Actor
 
 
-class SubmitRecipe(ChannelMessage):
-    """Record a recipe's file as it is as a draft. Answered with `Noted`."""
+class SubmitRecipe(RecipeOrder):
+    """Record a recipe's file as it is as a draft."""
 
     purpose: ClassVar[str] = "to submit a recipe"
-    name: Name
-    reason: Why
-    actor: Actor
 
 
-class ApproveRecipe(ChannelMessage):
-    """Put a draft in force for the next lot; its author cannot. Answered with `Noted`."""
+class ApproveRecipe(RecipeOrder):
+    """Put a draft in force for the next lot; its author cannot."""
 
     purpose: ClassVar[str] = "to approve a recipe"
-    name: Name
     revision: Revision
-    reason: Why
-    actor: Actor
 
 
-class RejectRecipe(ChannelMessage):
-    """Retire a draft: it is not put in force. Answered with `Noted`."""
+class RejectRecipe(RecipeOrder):
+    """Retire a draft: it is not put in force."""
 
     purpose: ClassVar[str] = "to reject a draft"
-    name: Name
     revision: Revision
-    reason: Why
-    actor: Actor
 
 
-class RevertRecipe(ChannelMessage):
-    """Put a revision's text back into the recipe's file. Answered with `Noted`."""
+class RevertRecipe(RecipeOrder):
+    """Put a revision's text back into the recipe's file."""
 
     purpose: ClassVar[str] = "to put a recipe back"
-    name: Name
     revision: Revision | None = None
     """None for the approved one."""
-    reason: Why
-    actor: Actor
 
 
 class ImportRecipe(ChannelMessage):

@@ -10,8 +10,6 @@ def spark(areas_mm2: Sequence[float | None], wide: int = 96, high: int = 28) -> 
 
     Args:
         areas_mm2: in the order of the steps; those without an area are left out.
-        wide: width of the picture.
-        high: height of the picture.
     """
     largest = max((area for area in areas_mm2 if area is not None), default=0.0) or 1.0
     gap = (wide - 4) / max(1, len(areas_mm2) - 1)

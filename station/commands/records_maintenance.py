@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from station.channel.panel_queries import LotView
 from station.commands.records_options import by_option, config_option, folder_of, proof_options, public_keys_option
 from station.errors import StationError
 from station.records.audit import AuditEntry, append_audit
@@ -15,7 +16,7 @@ from station.records.holds import hold as place_hold
 from station.records.holds import read_holds
 from station.records.holds import release as release_hold
 from station.records.integrity_check import check_records
-from station.records.lots import Lot, end_lot, read_lots, start_lot
+from station.records.lots import end_lot, read_lots, start_lot
 from station.records.restore import restore_backup
 from station.records.short_transaction import short_transaction
 from station.records.signing import public_keys_of
@@ -178,6 +179,6 @@ def _number_or_lot(thing: str, *, is_lot: bool) -> int | str:
     return int(thing) if thing.isascii() and thing.isdigit() and not is_lot else thing
 
 
-def _lot_line(row: Lot) -> str:
+def _lot_line(row: LotView) -> str:
     ended = "runs" if row.ended_utc_ms is None else f"ended {formatted(row.ended_utc_ms)}"
     return printable(f"{row.name}: {row.grower}, began {formatted(row.began_utc_ms)}, {ended}")

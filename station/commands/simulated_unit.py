@@ -25,7 +25,6 @@ def calibrate_simulated_unit(site: Configuration, operator: str) -> Calibration 
 
     Args:
         site: its home folder, and the twin's camera.
-        operator: who calibrates.
 
     Returns:
         The stored calibration; None if the unit has one already.

@@ -173,10 +173,7 @@ class Alarms:
         """Hide it for a time, `LONGEST_SHELVED_S` at most; a latched one is never hidden.
 
         Args:
-            alarm: which.
             now_s: UTC.
-            for_s: how long.
-            by: who.
         """
         if (self.get(alarm).state, E.SHELVED) not in _life(alarm):
             return self

@@ -126,7 +126,6 @@ def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
 
     Args:
         recipe: steps, speeds, settling, frames, and how often it may press a fruit.
-        pace: the cell's.
 
     Raises:
         BadInputError: the inspection would take longer than the PLC can be told.
@@ -173,7 +172,6 @@ def late(limits: Deadlines, state: State, in_state_s: float, since_trigger_s: fl
 
     Args:
         limits: from `deadlines`.
-        state: the cycle's state now.
         in_state_s: time since it was entered.
         since_trigger_s: time since the trigger was accepted; None once its outcome is durable, and outside an
             inspection.

@@ -154,9 +154,6 @@ class Evidence:
         The first contact was seen too late, by half of the onset's interval on the average: a true closing is that much
         more than the measured one, so the area is looked for that much sooner; how far it may differ from the average
         is in the budget. Beyond the last trusted point the area is at least that point's, since it rises.
-
-        Args:
-            closing_mm: where.
         """
         place_mm = closing_mm - self._press.onset_uncertainty_mm / 2
         for before, after in pairwise(self.judged):

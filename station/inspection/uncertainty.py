@@ -106,7 +106,6 @@ def repeatability_at(closing_mm: float, measured: Sequence[Repeatability]) -> fl
     """The repeatability at a closing, as a share: interpolated, and beyond the ends as at the nearest.
 
     Args:
-        closing_mm: where.
         measured: in ascending order of closing.
     """
     before = [each for each in measured if each.closing_mm <= closing_mm]

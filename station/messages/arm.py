@@ -1,6 +1,6 @@
 """Messages of the arm: causes and remedies of its faults, its requests and its poses."""
 
-from station.messages.message import Name, Nested, Number, define, define_plural
+from station.messages.message import Nested, Number, define, define_plural
 
 FAULT = define("arm.fault", "arm: {cause}. {remedy}", cause=Nested(), remedy=Nested())
 
@@ -107,14 +107,13 @@ PROCESS_SILENT = define(
     limit_s=Number(),
     request=Nested(),
 )
-PROCESS_UNUSABLE = define("arm.process_unusable", "the arm's process cannot be used: {reason}", reason=Name())
-PROCESS_NOT_STARTED = define("arm.process_not_started", "the arm's process cannot be started: {reason}", reason=Name())
+PROCESS_UNUSABLE = define("arm.process_unusable", "the arm's process cannot be used: {reason}")
+PROCESS_NOT_STARTED = define("arm.process_not_started", "the arm's process cannot be started: {reason}")
 PROCESS_ENDED = define("arm.process_ended", "the arm's process ended with code {code}", code=Number())
 PROCESS_ENDED_AFTER = define(
     "arm.process_ended_after",
     "the arm's process ended with code {code}; its last output: {output}",
     code=Number(),
-    output=Name(),
 )
 PROCESS_RESTARTS = define_plural(
     "arm.process_restarts",
@@ -125,23 +124,16 @@ PROCESS_RESTARTS = define_plural(
     window_s=Number(),
 )
 
-DASHBOARD_SILENT = define("arm.dashboard_silent", "the dashboard server at {host} does not answer", host=Name())
-DASHBOARD_PROTOCOL = define("arm.dashboard_protocol", "the dashboard server at {host} breaks its protocol", host=Name())
-DASHBOARD_CLOSED = define("arm.dashboard_closed", "the dashboard server at {host} closed the connection", host=Name())
-DASHBOARD_ABSENT = define("arm.dashboard_absent", "no controller answers at {address}", address=Name())
+DASHBOARD_SILENT = define("arm.dashboard_silent", "the dashboard server at {host} does not answer")
+DASHBOARD_PROTOCOL = define("arm.dashboard_protocol", "the dashboard server at {host} breaks its protocol")
+DASHBOARD_CLOSED = define("arm.dashboard_closed", "the dashboard server at {host} closed the connection")
+DASHBOARD_ABSENT = define("arm.dashboard_absent", "no controller answers at {address}")
 DASHBOARD_UNKNOWN_HOST = define(
-    "arm.dashboard_unknown_host",
-    "no controller answers at {address}: there is no machine of that name",
-    address=Name(),
+    "arm.dashboard_unknown_host", "no controller answers at {address}: there is no machine of that name"
 )
-DASHBOARD_OTHER = define(
-    "arm.dashboard_other",
-    "what answers at {address} is no dashboard server: {greeting}",
-    address=Name(),
-    greeting=Name(),
-)
+DASHBOARD_OTHER = define("arm.dashboard_other", "what answers at {address} is no dashboard server: {greeting}")
 
-POSE = define("arm.pose", "the pose {name}", name=Name())
+POSE = define("arm.pose", "the pose {name}")
 POSE_BESIDE_NEST = define("arm.pose_beside_nest", "the pose beside the nest")
 UNHEALTHY = define("arm.unhealthy", "the station has not reported that it is healthy")
 BUSY = define("arm.busy", "the arm cannot go to {pose}: it is still on its way elsewhere", pose=Nested())
@@ -189,48 +181,29 @@ REQUEST_HALT = define("arm.request_halt", "brake")
 CHECK_CONTROLLER = define(
     "arm.check_controller",
     "{model} at {host}, serial number {serial}, PolyScope {version}: {mode}, safety {safety}, {control}",
-    model=Name(),
-    host=Name(),
-    serial=Name(),
-    version=Name(),
-    mode=Name(),
-    safety=Name(),
     control=Nested(),
 )
 CHECK_REMOTE = define("arm.check_remote", "remote control")
 CHECK_LOCAL = define("arm.check_local", "local control")
-CHECK_RTDE = define("arm.check_rtde", "RTDE at {address}, controller {version}", address=Name(), version=Name())
-CHECK_RTDE_REFUSES = define(
-    "arm.check_rtde_refuses",
-    "RTDE at {address}, controller {version}, refuses protocol 2",
-    address=Name(),
-    version=Name(),
-)
+CHECK_RTDE = define("arm.check_rtde", "RTDE at {address}, controller {version}")
+CHECK_RTDE_REFUSES = define("arm.check_rtde_refuses", "RTDE at {address}, controller {version}, refuses protocol 2")
 CHECK_RTDE_FROZEN = define(
     "arm.check_rtde_frozen",
     "RTDE at {address}, controller {version}, whose state is frozen or more than {limit_s} s late",
-    address=Name(),
-    version=Name(),
     limit_s=Number(),
 )
 CHECK_RTDE_REGISTERS = define(
-    "arm.check_rtde_registers",
-    "RTDE at {address}, controller {version}, its input registers are in use",
-    address=Name(),
-    version=Name(),
+    "arm.check_rtde_registers", "RTDE at {address}, controller {version}, its input registers are in use"
 )
 CHECK_RTDE_LATE = define(
     "arm.check_rtde_late",
     "what is at {address} answers an RTDE request later than {limit_s} s",
-    address=Name(),
     limit_s=Number(),
 )
-CHECK_RTDE_CLOSES = define(
-    "arm.check_rtde_closes", "what is at {address} closes the connection at an RTDE request", address=Name()
-)
-CHECK_NO_ANSWER = define("arm.check_no_answer", "nothing answers at {address}", address=Name())
-CHECK_PROGRAMS = define("arm.check_programs", "programs are taken at {address}", address=Name())
-CHECK_NO_PROGRAMS = define("arm.check_no_programs", "nothing takes programs at {address}", address=Name())
+CHECK_RTDE_CLOSES = define("arm.check_rtde_closes", "what is at {address} closes the connection at an RTDE request")
+CHECK_NO_ANSWER = define("arm.check_no_answer", "nothing answers at {address}")
+CHECK_PROGRAMS = define("arm.check_programs", "programs are taken at {address}")
+CHECK_NO_PROGRAMS = define("arm.check_no_programs", "nothing takes programs at {address}")
 REMEDY_HOST = define(
     "arm.remedy_host",
     "Check arm.host in station.yaml, and that the controller is on and its network cable is in",

@@ -1,6 +1,6 @@
 """Messages of calibration and verification: steps, checks with their remedies, and why none is stored."""
 
-from station.messages.message import Listed, Name, Nested, Number, define, define_plural
+from station.messages.message import Listed, Nested, Number, define, define_plural
 
 A_CALIBRATION = define("calibration.a_calibration", "a calibration")
 A_VERIFICATION = define("calibration.a_verification", "a verification")
@@ -202,29 +202,25 @@ PLACE_UNSEEN = define(
 PLACES_TOO_NEAR = define(
     "calibration.places_too_near", "expected places at least {least_mm} mm apart, the first is 0,0", least_mm=Number()
 )
-UNKNOWN = define("calibration.unknown", "there is no calibration {name}; see `station calibrate list`", name=Name())
+UNKNOWN = define("calibration.unknown", "there is no calibration {name}; see `station calibrate list`")
 NOT_STORED = define(
     "calibration.not_stored",
     "{folder}: cannot be stored: {error}; free space there, or make it writable, and do it again: nothing was kept",
-    folder=Name(),
-    error=Name(),
 )
 PICTURE_UNREADABLE = define(
-    "calibration.picture_unreadable", "{file}: the calibration's picture cannot be read; calibrate again", file=Name()
+    "calibration.picture_unreadable", "{file}: the calibration's picture cannot be read; calibrate again"
 )
 
 # Calibration in use, and what is due.
 SUMMARY_MEASURED = define(
     "calibration.summary_measured",
     "{calibration}: {scale_mm} mm/px ± {percent}%, measured",
-    calibration=Name(),
     scale_mm=Number(5),
     percent=Number(1),
 )
 SUMMARY_USUAL = define(
     "calibration.summary_usual",
     "{calibration}: {scale_mm} mm/px ± {percent}%, usual",
-    calibration=Name(),
     scale_mm=Number(5),
     percent=Number(1),
 )
@@ -274,7 +270,6 @@ OLD = define(
 CHECKS_FAILED = define(
     "calibration.checks_failed",
     "the last verification, {verification}, failed: {checks}",
-    verification=Name(),
     checks=Listed(),
 )
 

@@ -1,10 +1,10 @@
 """Messages of the camera: why it gives no frames, what is wrong with a frame, and what its check found."""
 
-from station.messages.message import Listed, Name, Nested, Number, define, define_plural
+from station.messages.message import Listed, Nested, Number, define, define_plural
 
-DIGIT = define("camera.digit", "DIGIT {serial}", serial=Name())
-TWIN = define("camera.twin", "twin at {address}", address=Name())
-REPLAY = define("camera.replay", "replay of {source}", source=Name())
+DIGIT = define("camera.digit", "DIGIT {serial}")
+TWIN = define("camera.twin", "twin at {address}")
+REPLAY = define("camera.replay", "replay of {source}")
 
 NO_FRAME = define(
     "camera.no_frame",
@@ -26,30 +26,21 @@ NO_FIRST_FRAME = define(
     reason=Nested(),
 )
 NOT_PLUGGED_IN = define(
-    "camera.not_plugged_in",
-    "no DIGIT {serial} is plugged in (found: {found}); check cable and serial number",
-    serial=Name(),
-    found=Name(),
+    "camera.not_plugged_in", "no DIGIT {serial} is plugged in (found: {found}); check cable and serial number"
 )
 NONE_PLUGGED_IN = define(
-    "camera.none_plugged_in",
-    "no DIGIT {serial} is plugged in, and no other one; check cable and serial number",
-    serial=Name(),
+    "camera.none_plugged_in", "no DIGIT {serial} is plugged in, and no other one; check cable and serial number"
 )
 NOT_OPENED = define(
     "camera.not_opened",
     "{node} cannot be opened; check that no other program uses it and that the user is in the group video",
-    node=Name(),
 )
-NO_MORE_FRAMES = define(
-    "camera.no_more_frames", "{node} gives no frames any more; the station searches it again", node=Name()
-)
-READING_FAILED = define("camera.reading_failed", "reading it failed: {reason}", reason=Name())
+NO_MORE_FRAMES = define("camera.no_more_frames", "{node} gives no frames any more; the station searches it again")
+READING_FAILED = define("camera.reading_failed", "reading it failed: {reason}")
 WRONG_MODE = define(
     "camera.wrong_mode",
     "DIGIT {serial}: {width}x{height} at {rate} frames/s was requested, the driver gave "
     "{given_width}x{given_height} at {given_rate}; plug it into a USB port of its own and try again",
-    serial=Name(),
     width=Number(),
     height=Number(),
     rate=Number(),
@@ -58,9 +49,7 @@ WRONG_MODE = define(
     given_rate=Number(),
 )
 LIGHT_FIRMWARE = define(
-    "camera.light_firmware",
-    "its light cannot be set colour by colour: write firmware {revision} or newer to it",
-    revision=Name(),
+    "camera.light_firmware", "its light cannot be set colour by colour: write firmware {revision} or newer to it"
 )
 LIGHT_REFUSED = define("camera.light_refused", "it refused its light's setting: unplug it and plug it in again")
 
@@ -68,106 +57,64 @@ TWIN_NO_FIRST_FRAME = define(
     "camera.twin_no_first_frame",
     "camera twin at {address}: no frame within {limit_s} s; {reason}. Start it with `station twin`, or correct "
     "camera.twin in station.yaml",
-    address=Name(),
     limit_s=Number(),
     reason=Nested(),
 )
 TWIN_LIGHT_NOT_SET = define(
     "camera.twin_light_not_set",
     "camera twin at {address}: the light could not be set; {reason}",
-    address=Name(),
     reason=Nested(),
 )
-TWIN_LIGHT_REFUSED = define(
-    "camera.twin_light_refused",
-    "camera twin at {address}: the light was refused: {reason}",
-    address=Name(),
-    reason=Name(),
-)
-TWIN_NO_TRUTH = define(
-    "camera.twin_no_truth",
-    "camera twin at {address}: no true mask of this frame: {reason}",
-    address=Name(),
-    reason=Name(),
-)
+TWIN_LIGHT_REFUSED = define("camera.twin_light_refused", "camera twin at {address}: the light was refused: {reason}")
+TWIN_NO_TRUTH = define("camera.twin_no_truth", "camera twin at {address}: no true mask of this frame: {reason}")
 TWIN_TRUTH_NOT_READ = define(
     "camera.twin_truth_not_read",
     "camera twin at {address}: the true mask could not be read; {reason}",
-    address=Name(),
     reason=Nested(),
 )
 LINK_CLOSED = define("camera.link_closed", "the connection was closed")
 LINK_SILENT = define("camera.link_silent", "nothing came for {limit_s} s", limit_s=Number())
-LINK_FAILED = define("camera.link_failed", "the connection failed: {reason}", reason=Name())
+LINK_FAILED = define("camera.link_failed", "the connection failed: {reason}")
 LONG_HEADER = define(
     "camera.long_header",
     "it announced a header of {found} bytes; at most {limit} are allowed",
     found=Number(0),
     limit=Number(0),
 )
-UNREADABLE_HEADER = define("camera.unreadable_header", "it sent a header that is no JSON: {reason}", reason=Name())
+UNREADABLE_HEADER = define("camera.unreadable_header", "it sent a header that is no JSON: {reason}")
 WRONG_HEADER = define("camera.wrong_header", "it sent a header that is no JSON object")
-NO_FRAME_HEADER = define(
-    "camera.no_frame_header",
-    "it sent {kind} where a frame was expected: {reason}",
-    kind=Name(),
-    reason=Name(),
-)
+NO_FRAME_HEADER = define("camera.no_frame_header", "it sent {kind} where a frame was expected: {reason}")
 WRONG_AGE = define(
     "camera.wrong_age",
     "it sent age_s {found}; expected seconds, from 0 to less than {limit}",
-    found=Name(),
     limit=Number(),
 )
 WRONG_SIZE = define(
     "camera.wrong_size",
     "it sent a frame of {width}x{height} pixels; 1 to {limit} a side are allowed",
-    width=Name(),
-    height=Name(),
     limit=Number(),
 )
 WRONG_LENGTH = define(
     "camera.wrong_length",
     "it sent {found} bytes for {width}x{height} pixels of 3 bytes",
-    found=Name(),
     width=Number(),
     height=Number(),
 )
-NOT_WHOLE = define(
-    "camera.not_whole", "it sent {key} {found}; expected a whole number, 0 or more", key=Name(), found=Name()
-)
-WRONG_ORDER = define(
-    "camera.wrong_order",
-    "it sent frame {found} after frame {before}; the numbers must rise",
-    found=Name(),
-    before=Name(),
-)
+NOT_WHOLE = define("camera.not_whole", "it sent {key} {found}; expected a whole number, 0 or more")
+WRONG_ORDER = define("camera.wrong_order", "it sent frame {found} after frame {before}; the numbers must rise")
 
-REPLAY_EMPTY = define(
-    "camera.replay_empty",
-    "replay: {source} holds no image; expected a folder of images or a video",
-    source=Name(),
-)
+REPLAY_EMPTY = define("camera.replay_empty", "replay: {source} holds no image; expected a folder of images or a video")
 REPLAY_NOT_OPEN = define("camera.replay_not_open", "replay: a frame was requested before it was opened")
 REPLAY_UNREADABLE = define(
-    "camera.replay_unreadable",
-    "replay: {file} is no image that can be read; remove it or record it again",
-    file=Name(),
+    "camera.replay_unreadable", "replay: {file} is no image that can be read; remove it or record it again"
 )
 REPLAY_MISSING = define(
-    "camera.replay_missing",
-    "replay: there is no folder or video {source}; correct camera.replay.source",
-    source=Name(),
+    "camera.replay_missing", "replay: there is no folder or video {source}; correct camera.replay.source"
 )
 REPLAY_WIDTHS = define(
-    "camera.replay_widths",
-    "replay: {file}: expected CSV with the columns image, width_mm: {reason}",
-    file=Name(),
-    reason=Name(),
+    "camera.replay_widths", "replay: {file}: expected CSV with the columns image, width_mm: {reason}"
 )
-REPLAY_WIDTH = define(
-    "camera.replay_width", "replay: {file}: a width is not a finite number of millimetres", file=Name()
-)
+REPLAY_WIDTH = define("camera.replay_width", "replay: {file}: a width is not a finite number of millimetres")
 REPLAY_ENDED = define("camera.replay_ended", "the recording has ended")
 REMEDY_REPLAY = define(
     "camera.remedy_replay",
@@ -193,7 +140,6 @@ BAD_FRAMES = define_plural(
 CHECK_FOUND = define(
     "camera.check_found",
     "{camera}, {width_px}x{height_px}, {rate} frames/s",
-    camera=Name(),
     width_px=Number(),
     height_px=Number(),
     rate=Number(1),
@@ -201,8 +147,6 @@ CHECK_FOUND = define(
 CHECK_REVISION = define(
     "camera.check_revision",
     "{camera}, revision {revision}, {width_px}x{height_px}, {rate} frames/s",
-    camera=Name(),
-    revision=Name(),
     width_px=Number(),
     height_px=Number(),
     rate=Number(1),
@@ -215,7 +159,7 @@ CHECK_BAD = define(
     bad=Number(),
     faults=Listed(),
 )
-CHECK_NONE = define("camera.check_none", "driver {driver}: no usable camera", driver=Name())
+CHECK_NONE = define("camera.check_none", "driver {driver}: no usable camera")
 REMEDIES = define("camera.remedies", "{remedies}", remedies=Listed("; "))
 REMEDY_STALE = define(
     "camera.remedy_stale",

@@ -1,25 +1,17 @@
 """Messages of the line's CAN: the bus, its nodes and the reject actuations."""
 
-from station.messages.message import Name, Nested, Number, define
+from station.messages.message import Nested, Number, define
 
 # The interface.
-INTERFACE = define("can.interface", "the CAN interface {interface} {channel}", interface=Name(), channel=Name())
+INTERFACE = define("can.interface", "the CAN interface {interface} {channel}")
 INTERFACE_PORT = define(
     "can.interface_port",
     "the CAN interface {interface} {channel} port {port}",
-    interface=Name(),
-    channel=Name(),
     port=Number(),
 )
-NOT_OPENED = define(
-    "can.not_opened", "{bus} cannot be opened: {error}; {remedy}", bus=Nested(), error=Name(), remedy=Nested()
-)
-NOT_SENDING = define(
-    "can.not_sending", "{bus} does not send: {error}; {remedy}", bus=Nested(), error=Name(), remedy=Nested()
-)
-NOT_RECEIVING = define(
-    "can.not_receiving", "{bus} does not receive: {error}; {remedy}", bus=Nested(), error=Name(), remedy=Nested()
-)
+NOT_OPENED = define("can.not_opened", "{bus} cannot be opened: {error}; {remedy}", bus=Nested(), remedy=Nested())
+NOT_SENDING = define("can.not_sending", "{bus} does not send: {error}; {remedy}", bus=Nested(), remedy=Nested())
+NOT_RECEIVING = define("can.not_receiving", "{bus} does not receive: {error}; {remedy}", bus=Nested(), remedy=Nested())
 DEAF = define(
     "can.deaf", "{bus} receives nothing: the receiving thread has ended; it is reopened by itself", bus=Nested()
 )
@@ -29,7 +21,7 @@ BUS_OFF = define(
     "{bus} is bus-off after too many errors; check cable, termination and bit rate; it is reopened by itself",
     bus=Nested(),
 )
-BUS_FAILED = define("can.bus_failed", "the bus failed: {error}; check the interface", error=Name())
+BUS_FAILED = define("can.bus_failed", "the bus failed: {error}; check the interface")
 DO_ROUTE = define(
     "can.do_route", "this machine needs a network route for multicast: choose another can.channel, or add a route"
 )
@@ -40,8 +32,6 @@ DO_BRING_UP = define(
     "can.do_bring_up",
     "look for it with: ip link show type can; bring it up with: ip link set {channel} up type can bitrate {bitrate} "
     "restart-ms 100",
-    channel=Name(),
-    bitrate=Name(),
 )
 
 # The nodes.
@@ -51,9 +41,6 @@ NO_HEARTBEAT = define(
     "can.no_heartbeat",
     "no heartbeat of {node} on {interface} {channel}; check its power, cable, bit rate and node id ({setting})",
     node=Nested(),
-    interface=Name(),
-    channel=Name(),
-    setting=Name(),
 )
 ANOTHER_DEVICE = define(
     "can.another_device",
@@ -61,14 +48,11 @@ ANOTHER_DEVICE = define(
     "and {setting} to the same number",
     node=Nested(),
     what=Nested(),
-    found=Name(),
-    expected=Name(),
-    setting=Name(),
 )
-READING = define("can.reading", "reading its {object}", object=Name())
-WRITING = define("can.writing", "setting its {object} to {value}", object=Name(), value=Name())
-READING_MAPPING = define("can.reading_mapping", "reading the mapping of its {pdo}", pdo=Name())
-WRITING_MAPPING = define("can.writing_mapping", "setting the mapping of its {pdo}", pdo=Name())
+READING = define("can.reading", "reading its {object}")
+WRITING = define("can.writing", "setting its {object} to {value}")
+READING_MAPPING = define("can.reading_mapping", "reading the mapping of its {pdo}")
+WRITING_MAPPING = define("can.writing_mapping", "setting the mapping of its {pdo}")
 DEVICE_TYPE = define("can.device_type", "device type")
 VENDOR = define("can.vendor", "vendor")
 PRODUCT = define("can.product", "product")
@@ -78,25 +62,18 @@ ANOTHER_MAPPING = define(
     "{node} accepted its PDO mapping and has another one: {pdo} is {found}, expected {expected}; compare its firmware "
     "with the data sheet that the station ships",
     node=Nested(),
-    pdo=Name(),
-    found=Name(),
-    expected=Name(),
 )
 ANOTHER_VALUE = define(
     "can.another_value",
     "{node} was given {object} {written} and holds {read}; compare its firmware with the data sheet that the station "
     "ships",
     node=Nested(),
-    object=Name(),
-    written=Name(),
-    read=Name(),
 )
 REFUSED = define(
     "can.refused",
     "{node} refused {access}: {error}; compare its firmware with the data sheet that the station ships",
     node=Nested(),
     access=Nested(),
-    error=Name(),
 )
 NO_ANSWER = define(
     "can.no_answer",
@@ -109,35 +86,29 @@ NONSENSE = define(
     "{node} answered {access} with nonsense: {error}; compare its firmware with the data sheet that the station ships",
     node=Nested(),
     access=Nested(),
-    error=Name(),
 )
 FAILED_MEANWHILE = define(
     "can.failed_meanwhile",
     "the bus failed during {access} of {node}: {error}; check the interface",
     node=Nested(),
     access=Nested(),
-    error=Name(),
 )
 STATE_REFUSED = define(
     "can.state_refused",
     "{node} did not become {state} when commanded; check its state, and that there is no second master",
     node=Nested(),
-    state=Name(),
 )
 SILENT = define("can.silent", "{node} sends no heartbeat any more; check its power and cable", node=Nested())
 STATE_CHANGED = define(
     "can.state_changed",
     "{node} is {state} without a command: it was restarted, or lost the station's heartbeat; it is brought up again",
     node=Nested(),
-    state=Name(),
 )
 EMERGENCY = define(
     "can.emergency",
     "{node}: {what} (emergency {code}, error register {register}); {remedy}",
     node=Nested(),
     what=Nested(),
-    code=Name(),
-    register=Name(),
     remedy=Nested(),
 )
 
@@ -218,11 +189,7 @@ ORDER_MALFORMED = define(
     "can.order_malformed",
     "expected a sequence from 1 to {most}, a lane from 1 to {lanes} and a count from 0 to {most}, found {sequence}, "
     "{lane} and {at_count}",
-    most=Name(),
     lanes=Number(),
-    sequence=Name(),
-    lane=Name(),
-    at_count=Name(),
 )
 COUNT_PAST = define(
     "can.count_past",

@@ -1,6 +1,6 @@
 """Messages of commands of the PLC and of operators: why one was not done."""
 
-from station.messages.message import Listed, Name, Nested, Number, define
+from station.messages.message import Listed, Nested, Number, define
 
 MODE_UNKNOWN = define(
     "command.mode_unknown", "mode {mode}: expected 1 (production), 2 (maintenance) or 3 (manual)", mode=Number()
@@ -9,9 +9,7 @@ MODE_KEPT = define(
     "command.mode_kept", "{activity} at the panel needs this mode: let it end, or call it off there", activity=Nested()
 )
 JOGGING = define("command.jogging", "jogging")
-RECIPE_UNKNOWN = define(
-    "command.recipe_unknown", "recipe {number}: expected one of {known}", number=Number(), known=Name()
-)
+RECIPE_UNKNOWN = define("command.recipe_unknown", "recipe {number}: expected one of {known}", number=Number())
 NO_RECIPES = define(
     "command.no_recipes", "recipe {number}: there is no recipe to choose; see `station recipes check`", number=Number()
 )
@@ -46,9 +44,8 @@ JUDGED = define("command.judged", "the inspection is already judged")
 TOO_SLOW = define(
     "command.too_slow",
     "{command} did not come to its end within {limit_s} s: {activity}",
-    command=Name(),
     limit_s=Number(),
     activity=Nested(),
 )
 NOTHING_TO_RECOVER = define("command.nothing_to_recover", "there is nothing to recover from any more")
-NO_NUMBER = define("command.no_number", "{command}: {argument} is no number", command=Name(), argument=Name())
+NO_NUMBER = define("command.no_number", "{command}: {argument} is no number")

@@ -1,22 +1,20 @@
 """Messages of the values that a field accepts."""
 
-from station.messages.message import Name, Nested, Number, define, define_plural
+from station.messages.message import Nested, Number, define, define_plural
 
-EXACTLY = define("expect.exactly", "{value}", value=Name())
-ONE_OF = define("expect.one_of", "one of {choices}", choices=Name())
+EXACTLY = define("expect.exactly", "{value}")
+ONE_OF = define("expect.one_of", "one of {choices}")
 SWITCH = define("expect.switch", "true or false")
 INTEGER = define("expect.integer", "an integer")
-INTEGER_IN = define("expect.integer_in", "an integer in{unit}", unit=Name())
+INTEGER_IN = define("expect.integer_in", "an integer in{unit}")
 INTEGER_BETWEEN = define(
-    "expect.integer_between", "an integer from {least} to {most}{unit}", least=Number(), most=Number(), unit=Name()
+    "expect.integer_between", "an integer from {least} to {most}{unit}", least=Number(), most=Number()
 )
-INTEGER_IF = define("expect.integer_if", "an integer {condition}{unit}", condition=Nested(), unit=Name())
+INTEGER_IF = define("expect.integer_if", "an integer {condition}{unit}", condition=Nested())
 NUMBER = define("expect.number", "a number")
-NUMBER_IN = define("expect.number_in", "a number in{unit}", unit=Name())
-NUMBER_BETWEEN = define(
-    "expect.number_between", "a number from {least} to {most}{unit}", least=Number(), most=Number(), unit=Name()
-)
-NUMBER_IF = define("expect.number_if", "a number {condition}{unit}", condition=Nested(), unit=Name())
+NUMBER_IN = define("expect.number_in", "a number in{unit}")
+NUMBER_BETWEEN = define("expect.number_between", "a number from {least} to {most}{unit}", least=Number(), most=Number())
+NUMBER_IF = define("expect.number_if", "a number {condition}{unit}", condition=Nested())
 AT_LEAST = define("expect.at_least", "at least {value}", value=Number())
 ABOVE = define("expect.above", "above {value}", value=Number())
 AT_MOST = define("expect.at_most", "at most {value}", value=Number())
@@ -25,7 +23,7 @@ BOTH = define("expect.both", "{first} and {second}", first=Nested(), second=Nest
 TEXT = define("expect.text", "a text")
 PATH = define("expect.path", "a path")
 TEXT_OF = define("expect.text_of", "{text} of {length}", text=Nested(), length=Nested())
-MATCHING = define("expect.matching", "{text} that matches {pattern}", text=Nested(), pattern=Name())
+MATCHING = define("expect.matching", "{text} that matches {pattern}", text=Nested())
 CHARACTERS = define_plural("expect.characters", "{number} character", "{number} characters", "number", number=Number())
 CHARACTERS_LEAST = define_plural(
     "expect.characters_least", "at least {number} character", "at least {number} characters", "number", number=Number()
@@ -46,6 +44,6 @@ ITEMS_MOST = define_plural(
 )
 ITEMS_BETWEEN = define("expect.items_between", "{least} to {most} items", least=Number(), most=Number())
 MAPPING = define("expect.mapping", "a mapping")
-MAPPING_WITH = define("expect.mapping_with", "a mapping with {names}", names=Name())
+MAPPING_WITH = define("expect.mapping_with", "a mapping with {names}")
 OR_NULL = define("expect.or_null", "{value} or null", value=Nested())
 EITHER = define("expect.either", "{first} or {second}", first=Nested(), second=Nested())

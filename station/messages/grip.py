@@ -1,6 +1,6 @@
 """Messages of a grip: what kept it from its end, what the jaws do, and why a picture may not be the reference."""
 
-from station.messages.message import Listed, Name, Nested, Number, define
+from station.messages.message import Listed, Nested, Number, define
 
 BAD_FRAMES = define(
     "grip.bad_frames",
@@ -20,7 +20,6 @@ NOTHING_TOUCHED = define(
     "and that the arm is there",
     largest_mm=Number(),
     smallest_mm=Number(),
-    recipe=Name(),
 )
 CALLED_OFF = define("grip.called_off", "the grip was called off")
 NOT_OPENED = define(
@@ -71,4 +70,4 @@ REFERENCE_TOUCHED = define(
     renewal=Nested(),
 )
 RENEW_BY_CALIBRATION = define("grip.renew_by_calibration", "calibrate")
-RENEW_BY_REMOVAL = define("grip.renew_by_removal", "remove {file} from the home folder", file=Name())
+RENEW_BY_REMOVAL = define("grip.renew_by_removal", "remove {file} from the home folder")

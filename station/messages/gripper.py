@@ -1,9 +1,9 @@
 """Messages of the gripper: causes and remedies of its faults, its state, and what answers on its wire."""
 
-from station.messages.message import Name, Nested, Number, define
+from station.messages.message import Nested, Number, define
 
 FAULT = define("gripper.fault", "gripper: {cause}; {remedy}", cause=Nested(), remedy=Nested())
-REPORTED = define("gripper.reported", "{cause} (fault {number}, {name})", cause=Nested(), number=Name(), name=Name())
+REPORTED = define("gripper.reported", "{cause} (fault {number}, {name})", cause=Nested())
 
 ACTIVATE_FIRST = define("gripper.activate_first", "it received a motion before its activation was complete")
 ACTIVATION_BIT = define("gripper.activation_bit", "it received a motion without being activated")
@@ -107,10 +107,8 @@ REMEDY_FORCE = define(
     "correct the recipe's force; a soft fruit is protected by small width steps, not by the force",
 )
 
-PLACE_URCAP = define("gripper.place_urcap", "URCap at {address}", address=Name())
-PLACE_MODBUS_RTU = define(
-    "gripper.place_modbus_rtu", "Modbus RTU unit {unit} at {address}", unit=Number(), address=Name()
-)
+PLACE_URCAP = define("gripper.place_urcap", "URCap at {address}")
+PLACE_MODBUS_RTU = define("gripper.place_modbus_rtu", "Modbus RTU unit {unit} at {address}", unit=Number())
 SILENT = define("gripper.silent", "{place} did not answer within {limit_s} s", place=Nested(), limit_s=Number())
 REMEDY_SILENT_ROBOT = define(
     "gripper.remedy_silent_robot", "check that the robot is powered and the gripper shows a steady LED"
@@ -143,14 +141,11 @@ WRONG_ANSWER = define(
     "gripper.wrong_answer",
     "{place} answered {answer} to {request}",
     place=Nested(),
-    answer=Name(),
-    request=Name(),
 )
 NOT_MODBUS_RTU = define(
     "gripper.not_modbus_rtu",
     "{place} sent what is no Modbus RTU answer: {octets}",
     place=Nested(),
-    octets=Name(),
 )
 MODBUS_EXCEPTION = define(
     "gripper.modbus_exception",
@@ -187,7 +182,6 @@ CHECK_FOUND = define(
     place=Nested(),
     count=Number(),
     width_mm=Number(1),
-    state=Name(),
 )
 CHECK_TROUBLE = define("gripper.check_trouble", "{found}; {trouble}", found=Nested(), trouble=Nested())
 CHECK_AT = define("gripper.check_at", "{place}: {trouble}", place=Nested(), trouble=Nested())

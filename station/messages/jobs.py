@@ -1,6 +1,6 @@
 """Messages of the pages' jobs and requests."""
 
-from station.messages.message import Name, Number, define, define_plural
+from station.messages.message import Number, define, define_plural
 
 TOO_MANY = define_plural(
     "job.too_many",
@@ -9,13 +9,13 @@ TOO_MANY = define_plural(
     "number",
     number=Number(),
 )
-NO_FOLDER = define("job.no_folder", "{folder}: {error}; make it writable", folder=Name(), error=Name())
+NO_FOLDER = define("job.no_folder", "{folder}: {error}; make it writable")
 DISK_FULL = define(
-    "job.disk_full", "{free_mb} MB are free on the disk of {folder}; free space first", free_mb=Number(0), folder=Name()
+    "job.disk_full", "{free_mb} MB are free on the disk of {folder}; free space first", free_mb=Number(0)
 )
 UNKNOWN = define("job.unknown", "this job is not known any more; begin it again")
 LATE = define("job.late", "it was not done within {limit_min} min; ask for less", limit_min=Number())
-NOT_STARTED = define("job.not_started", "it could not be started: {error}", error=Name())
+NOT_STARTED = define("job.not_started", "it could not be started: {error}")
 REQUESTS_FULL = define(
     "job.requests_full", "{number} requests of the pages are waiting; try again in a moment", number=Number()
 )
@@ -31,6 +31,4 @@ NOT_RECENT = define(
 )
 PICTURE_NOT_ENCODED = define("job.picture_not_encoded", "the picture could not be encoded")
 NO_TIME = define("job.no_time", "{utc_ms} ms is no time of a calendar; give another one", utc_ms=Number())
-UNPRINTABLE = define(
-    "job.unprintable", "{text} contains what cannot be printed; give a name of printable letters", text=Name()
-)
+UNPRINTABLE = define("job.unprintable", "{text} contains what cannot be printed; give a name of printable letters")

@@ -1,6 +1,6 @@
 """Messages of the judge: what an inspection showed, beside which limit, and why no further step was made."""
 
-from station.messages.message import Listed, Name, Nested, Number, define, define_plural
+from station.messages.message import Listed, Nested, Number, define, define_plural
 
 # What ended or spoilt the inspection from outside the measurement.
 REFERENCE_BAD = define(
@@ -26,7 +26,6 @@ WRONG_WIDTH = define(
     "judge.wrong_width",
     "The fruit is {width_mm} mm wide; {recipe} is meant for {smallest_mm} to {largest_mm} mm.",
     width_mm=Number(1),
-    recipe=Name(),
     smallest_mm=Number(),
     largest_mm=Number(),
 )
@@ -36,7 +35,6 @@ LENGTH_UNEXPECTED = define(
     "judge.length_unexpected",
     "The PLC gave a length of {length_mm} mm; {recipe} is expected with {smallest_mm} to {largest_mm} mm.",
     length_mm=Number(1),
-    recipe=Name(),
     smallest_mm=Number(),
     largest_mm=Number(),
 )
@@ -70,7 +68,6 @@ LIMIT = define("judge.limit", "the limit is {limit_mm2} mm²", limit_mm2=Number(
 LIMIT_OF_LENGTH = define(
     "judge.limit_of_length",
     "the limit for {fruit} of {length_mm} mm is {limit_mm2} mm²",
-    fruit=Name(),
     length_mm=Number(1),
     limit_mm2=Number(1),
 )

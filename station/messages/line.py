@@ -1,6 +1,6 @@
 """Messages of the PLC interface: faults of the handshake and of its files."""
 
-from station.messages.message import Name, define
+from station.messages.message import define
 
 PLC_SILENT = define("line.plc_silent", "the PLC's heartbeat did not change: check the PLC, then give enable again")
 WRITER_LOST = define("line.writer_lost", "the writing PLC's connection was lost: connect, then give enable again")
@@ -25,18 +25,13 @@ COMMAND_BUSY = define(
 JOURNAL_NOT_WRITTEN = define(
     "line.journal_not_written",
     "the journal {file} cannot be written: {error}; until it can, a restart of the PLC interface may lose results",
-    file=Name(),
-    error=Name(),
 )
 JOURNAL_NOT_KEPT = define(
     "line.journal_not_kept",
     "the PLC interface cannot keep its journal in {folder}: {error}; give this user the right to write there, or set "
     "home to another folder",
-    folder=Name(),
-    error=Name(),
 )
 ANOTHER_INTERFACE = define(
     "line.another_interface",
     "another PLC interface runs in {folder}: stop it, or give this one a home folder of its own",
-    folder=Name(),
 )

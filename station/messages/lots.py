@@ -1,14 +1,13 @@
 """Messages of lots."""
 
-from station.messages.message import Name, Nested, Number, define
+from station.messages.message import Nested, Number, define
 
-REFUSED = define("lot.refused", "Lot {lot} cannot begin: {why}.", lot=Name(), why=Nested())
+REFUSED = define("lot.refused", "Lot {lot} cannot begin: {why}.", why=Nested())
 NAMELESS_REFUSED = define("lot.nameless_refused", "A lot without a name cannot begin: {why}.", why=Nested())
 PLC_NAMES = define("lot.plc_names", "the line's PLC names the lots: start and end them there")
 BAD_NAME = define(
     "lot.bad_name",
     "{name} is no lot's name: expected 1 to {longest} letters, digits and signs",
-    name=Name(),
     longest=Number(),
 )
 NONE = define("lot.none", "no lot was started at the panel")

@@ -1,6 +1,6 @@
 """Messages of the maintenance page: why nothing may be moved by hand, and why no contact is shown."""
 
-from station.messages.message import Name, Nested, Number, define
+from station.messages.message import Nested, Number, define
 
 ENDING = define("maintenance.ending", "The station is ending.")
 BUSY = define("maintenance.busy", "An inspection is under way: wait for its end.")
@@ -27,7 +27,7 @@ NO_GOLDEN = define(
     "maintenance.no_golden", "There is no golden reference yet: calibrate, or let the station inspect once."
 )
 GOLDEN_UNREADABLE = define(
-    "maintenance.golden_unreadable", "The golden reference {file} cannot be read: calibrate again.", file=Name()
+    "maintenance.golden_unreadable", "The golden reference {file} cannot be read: calibrate again."
 )
 GOLDEN_SIZE = define(
     "maintenance.golden_size", "The image has another size than the golden reference: calibrate again."

@@ -116,12 +116,12 @@ def define(id: str, english: str, **parameters: Kind) -> Definition:  # noqa: A0
     Args:
         id: unique.
         english: the sentence, each parameter in braces.
-        parameters: what kind each of them is.
+        parameters: what kind each of them is; one that is left out is a `Name`.
 
     Raises:
-        ValueError: the id is taken, or the braces are not the parameters.
+        ValueError: the id is taken, or a parameter is in no braces.
     """
-    return _registered(Definition(id, english, parameters))
+    return _registered(Definition(id, english, _with_names(parameters, english)))
 
 
 def define_plural(id: str, english: str, plural: str, counted: str, **parameters: Kind) -> Definition:  # noqa: A002
@@ -132,17 +132,22 @@ def define_plural(id: str, english: str, plural: str, counted: str, **parameters
         english: the sentence for one.
         plural: the sentence for all other numbers.
         counted: the parameter that decides.
-        parameters: what kind each of them is.
+        parameters: what kind each of them is; one that is left out is a `Name`.
 
     Raises:
         TypeError: what decides is no number among the parameters.
-        ValueError: the id is taken, or the braces are not the parameters.
+        ValueError: the id is taken, or a parameter is in no braces.
     """
     if not isinstance(parameters.get(counted), Number):
         raise TypeError(f"{id}: {counted} is no number among its parameters")
-    if missing := parameters.keys() - {counted} - fields(plural):
-        raise ValueError(f"{id}: the plural lacks {sorted(missing)}")
-    return _registered(Definition(id, english, parameters, plural, counted))
+    all_of_them = _with_names(parameters, english)
+    if missing := (all_of_them.keys() - {counted}) ^ (fields(plural) - {counted}):
+        raise ValueError(f"{id}: the two forms differ in {sorted(missing)}")
+    return _registered(Definition(id, english, all_of_them, plural, counted))
+
+
+def _with_names(parameters: Mapping[str, Kind], english: str) -> Mapping[str, Kind]:
+    return {**dict.fromkeys(fields(english), Name()), **parameters}
 
 
 def fields(sentence: str) -> set[str]:
@@ -167,8 +172,8 @@ def definitions() -> Iterator[Definition]:
 def _registered(new: Definition) -> Definition:
     if new.id in _DEFINITIONS:
         raise ValueError(f"{new.id} is defined twice")
-    if (found := fields(new.english)) - new.parameters.keys() or new.parameters.keys() - found - {new.counted}:
-        raise ValueError(f"{new.id}: the sentence has {sorted(found)}, the parameters are {sorted(new.parameters)}")
+    if unused := new.parameters.keys() - fields(new.english) - {new.counted}:
+        raise ValueError(f"{new.id}: the sentence has no {sorted(unused)}")
     _DEFINITIONS[new.id] = new
     return new
 
@@ -216,7 +221,7 @@ def _english_number(value: float, digits: int | None) -> str:
 ENGLISH = Renderer(lambda known, count: known.plural if known.plural and count != 1 else known.english, _english_number)
 """For logs and the command line."""
 
-VERBATIM = define("text.verbatim", "{text}", text=Name())
+VERBATIM = define("text.verbatim", "{text}")
 """Words that are not the station's: a library's, the operating system's, a person's; or of records before messages."""
 
 

@@ -1,18 +1,14 @@
 """Messages of the running station: what its checks found, and what ended an inspection."""
 
-from station.messages.message import Name, Nested, Number, define
+from station.messages.message import Nested, Number, define
 
 INTERFACE_SILENT = define(
     "operation.interface_silent", "the PLC interface has sent nothing for {age_s} s", age_s=Number(0)
 )
 HEARTBEAT_STILL = define("operation.heartbeat_still", "the PLC's heartbeat does not change")
 PAGES_SILENT = define("operation.pages_silent", "the pages' process has sent no request for {age_s} s", age_s=Number(0))
-PAGES_FLOODED = define(
-    "operation.pages_flooded", "connections of {address} to the pages are turned away", address=Name()
-)
-METRICS_FLOODED = define(
-    "operation.metrics_flooded", "connections of {address} to the metrics are turned away", address=Name()
-)
+PAGES_FLOODED = define("operation.pages_flooded", "connections of {address} to the pages are turned away")
+METRICS_FLOODED = define("operation.metrics_flooded", "connections of {address} to the metrics are turned away")
 DISK_LOW = define(
     "operation.disk_low",
     "{free_mb} MB are free, {reserve_mb} MB are the reserve",
@@ -21,14 +17,11 @@ DISK_LOW = define(
 )
 NEVER_CHOSEN = define("operation.never_chosen", "no recipe was ever chosen, or it is gone")
 PROCESS_GIVEN_UP = define(
-    "operation.process_given_up",
-    "the process {process} ended again and again and is not started any more",
-    process=Name(),
+    "operation.process_given_up", "the process {process} ended again and again and is not started any more"
 )
 PROCESS_RESTARTED = define(
     "operation.process_restarted",
     "the process {process} was started again {times} times within {within_s} s",
-    process=Name(),
     times=Number(),
     within_s=Number(),
 )
@@ -74,12 +67,11 @@ STATION_ENDS = define("operation.station_ends", "the station was ended")
 STOPPED_AT_PANEL = define("operation.stopped_at_panel", "a person stopped the station at the panel")
 CALLED_OFF = define("operation.called_off", "the PLC or a person called the inspection off")
 RESET = define("operation.reset", "a person has reset the station")
-INTERNAL_FAULT = define("operation.internal_fault", "a fault of the software, see the log: {words}", words=Name())
+INTERNAL_FAULT = define("operation.internal_fault", "a fault of the software, see the log: {words}")
 DEADLINE_TOO_SHORT = define(
     "operation.deadline_too_short",
     "recipe {recipe}: an inspection may take {needed_s} s here, but service.inspection_deadline_s is {allowed_s} s; "
     "raise it, and the PLC's time-out with it, or use fewer steps, a shorter settle time or fewer frames",
-    recipe=Name(),
     needed_s=Number(1),
     allowed_s=Number(1),
 )
@@ -87,7 +79,6 @@ INSPECTION_TOO_LONG = define(
     "operation.inspection_too_long",
     "recipe {recipe}: an inspection may take {needed_s} s here, expected at most {limit_s} s; use fewer steps, a "
     "shorter settle time or fewer frames",
-    recipe=Name(),
     needed_s=Number(0),
     limit_s=Number(),
 )

@@ -1,6 +1,6 @@
 """Messages of readiness: why no trigger is accepted, and what to do."""
 
-from station.messages.message import Listed, Name, Number, define
+from station.messages.message import Listed, Number, define
 
 ENDING = define("readiness.ending", "The station is ending: start it again.")
 STOPPED_BY_PERSON = define(
@@ -9,9 +9,9 @@ STOPPED_BY_PERSON = define(
 NO_PROGRESS = define(
     "readiness.no_progress", "No progress of {parts}: restart the station if it stays so.", parts=Listed()
 )
-PART_AGE = define("readiness.part_age", "{part} for {age_s} s", part=Name(), age_s=Number(0))
+PART_AGE = define("readiness.part_age", "{part} for {age_s} s", age_s=Number(0))
 RECIPE_CHANGING = define("readiness.recipe_changing", "The recipe is being changed: wait a moment.")
-NO_RECIPE = define("readiness.no_recipe", "No recipe is active: choose one by its number ({numbers}).", numbers=Name())
+NO_RECIPE = define("readiness.no_recipe", "No recipe is active: choose one by its number ({numbers}).")
 NO_RECIPE_AT_ALL = define(
     "readiness.no_recipe_at_all", "No recipe is active, and there is none to choose: see `station recipes check`."
 )

@@ -1,43 +1,33 @@
 """Messages of the records: what keeps a request from being carried out, and what to do."""
 
-from station.messages.message import Name, Nested, Number, define
+from station.messages.message import Nested, Number, define
 
 FAULT = define("records.fault", "records: {cause}; {remedy}", cause=Nested(), remedy=Nested())
 
 # Opening, disk and database.
-DISK_FULL = define("records.disk_full", "{place}: the disk is full ({words})", place=Name(), words=Name())
-NOT_WRITABLE = define("records.not_writable", "{place}: cannot be written ({words})", place=Name(), words=Name())
-LOCKED = define("records.locked", "{place}: another program holds the database ({words})", place=Name(), words=Name())
-DISK_FAILED = define("records.disk_failed", "{place}: the disk failed ({words})", place=Name(), words=Name())
-DAMAGED = define("records.damaged", "{place}: the database is damaged ({words})", place=Name(), words=Name())
-NO_DATABASE = define("records.no_database", "{place}: this is no database ({words})", place=Name(), words=Name())
+DISK_FULL = define("records.disk_full", "{place}: the disk is full ({words})")
+NOT_WRITABLE = define("records.not_writable", "{place}: cannot be written ({words})")
+LOCKED = define("records.locked", "{place}: another program holds the database ({words})")
+DISK_FAILED = define("records.disk_failed", "{place}: the disk failed ({words})")
+DAMAGED = define("records.damaged", "{place}: the database is damaged ({words})")
+NO_DATABASE = define("records.no_database", "{place}: this is no database ({words})")
 FILE_OR_FOLDER = define(
-    "records.file_or_folder",
-    "{place}: a file is where a folder has to be, or a folder where a file ({words})",
-    place=Name(),
-    words=Name(),
+    "records.file_or_folder", "{place}: a file is where a folder has to be, or a folder where a file ({words})"
 )
-REFUSED = define("records.refused", "{place}: the database refused: {words}", place=Name(), words=Name())
-UNEXPECTED = define("records.unexpected", "{place}: {kind}: {words}", place=Name(), kind=Name(), words=Name())
-MALFORMED = define("records.malformed", "what was to be recorded is malformed: {words}", words=Name())
+REFUSED = define("records.refused", "{place}: the database refused: {words}")
+UNEXPECTED = define("records.unexpected", "{place}: {kind}: {words}")
+MALFORMED = define("records.malformed", "what was to be recorded is malformed: {words}")
 RESERVE_REACHED = define(
     "records.reserve_reached",
     "{free_mb} MB are free on the disk of {folder}, less than the reserve of {reserve_mb} MB",
     free_mb=Number(0),
-    folder=Name(),
     reserve_mb=Number(0),
 )
-ANOTHER_STATION = define(
-    "records.another_station",
-    "{folder}: another station has it, process {process}",
-    folder=Name(),
-    process=Name(),
-)
-REMOVED = define("records.removed", "{path}: was removed or replaced while the station ran", path=Name())
+ANOTHER_STATION = define("records.another_station", "{folder}: another station has it, process {process}")
+REMOVED = define("records.removed", "{path}: was removed or replaced while the station ran")
 MISSING_DATABASE = define(
     "records.missing_database",
     "{path}: there was none, though {number} inspections were numbered; a new one was begun",
-    path=Name(),
     number=Number(0),
 )
 BEGUN_ANEW = define(
@@ -47,33 +37,21 @@ BEGUN_ANEW = define(
     number=Number(0),
 )
 NUMBERS_UNKNOWN = define(
-    "records.numbers_unknown",
-    "{path}: which numbers were given is not known, and the database does not show it",
-    path=Name(),
+    "records.numbers_unknown", "{path}: which numbers were given is not known, and the database does not show it"
 )
 NUMBERS_USED_UP = define("records.numbers_used_up", "all {largest} sequence numbers were given", largest=Number(0))
 NUMBER_GIVEN = define("records.number_given", "{number} was given already", number=Number(0))
-NO_RECORDS = define("records.no_records", "there is no {path}", path=Name())
+NO_RECORDS = define("records.no_records", "there is no {path}")
 CLOSED = define("records.closed", "they are closed")
 TOO_SLOW = define("records.too_slow", "the disk did not take it within {limit_s} s", limit_s=Number())
 NO_ANSWER = define("records.no_answer", "no answer within {limit_s} s", limit_s=Number())
-NEWER_SCHEMA = define(
-    "records.newer_schema",
-    "{path} has the schema {schema} of a newer fruit-station",
-    path=Name(),
-    schema=Name(),
-)
+NEWER_SCHEMA = define("records.newer_schema", "{path} has the schema {schema} of a newer fruit-station")
 NOT_MIGRATED = define(
-    "records.not_migrated",
-    "the database could not be brought from schema {before} to {after}: {words}",
-    before=Name(),
-    after=Name(),
-    words=Name(),
+    "records.not_migrated", "the database could not be brought from schema {before} to {after}: {words}"
 )
 NO_SPACE_FOR_COPY = define(
     "records.no_space_for_copy",
     "{path}: no space for a copy of {size_bytes} bytes before the upgrade",
-    path=Name(),
     size_bytes=Number(0),
 )
 ORIGIN_MISSING = define("records.origin_missing", "the outbox's origin is missing from the database")
@@ -90,50 +68,37 @@ WRONG_REASONS = define(
     "records.wrong_reasons",
     "inspection {number}: {outcome} with the reasons {reasons}",
     number=Number(0),
-    outcome=Name(),
-    reasons=Name(),
 )
 BAD_INSPECTION = define(
     "records.bad_inspection",
     "inspection {number} is malformed: {words}",
     number=Number(0),
-    words=Name(),
 )
 PAGE_TOO_LARGE = define("records.page_too_large", "a page of {number} inspections", number=Number(0))
-NO_LOT = define("records.no_lot", "there is no lot {lot}", lot=Name())
-LOT_WITHOUT_INSPECTIONS = define("records.lot_without_inspections", "no inspection is of a lot {lot}", lot=Name())
-BAD_LOT_NAME = define("records.bad_lot_name", "the lot {text} is no name", text=Name())
-BAD_GROWER = define("records.bad_grower", "the grower {text} is no name", text=Name())
+NO_LOT = define("records.no_lot", "there is no lot {lot}")
+LOT_WITHOUT_INSPECTIONS = define("records.lot_without_inspections", "no inspection is of a lot {lot}")
+BAD_LOT_NAME = define("records.bad_lot_name", "the lot {text} is no name")
+BAD_GROWER = define("records.bad_grower", "the grower {text} is no name")
 LONG_LOT_NAME = define("records.long_lot_name", "the lot's name has {letters} letters", letters=Number(0))
-ANOTHER_GROWER = define(
-    "records.another_grower",
-    "lot {lot} is registered for {known}, not for {grower}",
-    lot=Name(),
-    known=Name(),
-    grower=Name(),
-)
+ANOTHER_GROWER = define("records.another_grower", "lot {lot} is registered for {known}, not for {grower}")
 INSPECTION_NOT_HELD = define(
     "records.inspection_not_held", "the images of inspection {number} are not retained", number=Number(0)
 )
-LOT_NOT_HELD = define("records.lot_not_held", "the images of lot {lot} are not retained", lot=Name())
+LOT_NOT_HELD = define("records.lot_not_held", "the images of lot {lot} are not retained")
 NO_REASON = define("records.no_reason", "no reason was given")
-AUDIT_VALUE = define("records.audit_value", "the audit trail cannot hold {value}: {words}", value=Name(), words=Name())
+AUDIT_VALUE = define("records.audit_value", "the audit trail cannot hold {value}: {words}")
 AUDIT_WORD = define(
     "records.audit_word",
     "audit: {field}: expected one printable line of 1 to {most} characters, got {text}",
-    field=Name(),
     most=Number(0),
-    text=Name(),
 )
 AUDIT_TEXT = define(
     "records.audit_text",
     "audit: {field}: expected at most {most} printable characters, got {text}",
-    field=Name(),
     most=Number(0),
-    text=Name(),
 )
 
-NO_SIGNING_KEY = define("records.no_signing_key", "{path}: this is no Ed25519 key in PEM form", path=Name())
+NO_SIGNING_KEY = define("records.no_signing_key", "{path}: this is no Ed25519 key in PEM form")
 
 # Images.
 IMAGES_PENDING = define("records.images_pending", "waiting for the disk")
@@ -180,36 +145,23 @@ NO_RECIPE = define("records.no_recipe", "inspection {number} has no recipe", num
 UNKNOWN_RECIPE = define("records.unknown_recipe", "this version does not accept the inspection's recipe")
 
 # Backup and restore.
-THERE_ALREADY = define("records.there_already", "{path} is there already", path=Name())
-NO_BACKUP = define("records.no_backup", "{path} is no backup: it has no {file}", path=Name(), file=Name())
-BAD_FILE = define("records.bad_file", "{path}: {words}", path=Name(), words=Name())
-OTHER_CONTENT = define(
-    "records.other_content",
-    "{path} is damaged: its content is not what its name says",
-    path=Name(),
-)
-NOT_THE_VERIFIED = define(
-    "records.not_the_verified", "{path} is missing, or not the one that was verified", path=Name()
-)
-NO_SUCH_FILE = define(
-    "records.no_such_file", "{path}: this is no file, or larger than {most} bytes", path=Name(), most=Number(0)
-)
+THERE_ALREADY = define("records.there_already", "{path} is there already")
+NO_BACKUP = define("records.no_backup", "{path} is no backup: it has no {file}")
+BAD_FILE = define("records.bad_file", "{path}: {words}")
+OTHER_CONTENT = define("records.other_content", "{path} is damaged: its content is not what its name says")
+NOT_THE_VERIFIED = define("records.not_the_verified", "{path} is missing, or not the one that was verified")
+NO_SUCH_FILE = define("records.no_such_file", "{path}: this is no file, or larger than {most} bytes", most=Number(0))
 BACKUP_UNSIGNED = define(
     "records.backup_unsigned",
     "{path} is not signed: a version before the signatures made it, or somebody removed the signature",
-    path=Name(),
 )
 BACKUP_OTHER_KEY = define(
-    "records.backup_other_key",
-    "{path} is not signed by the key {keys}: it was changed, or another station made it",
-    path=Name(),
-    keys=Name(),
+    "records.backup_other_key", "{path} is not signed by the key {keys}: it was changed, or another station made it"
 )
-IMAGE_MISSING = define("records.image_missing", "{path}: the image {image} is missing", path=Name(), image=Name())
+IMAGE_MISSING = define("records.image_missing", "{path}: the image {image} is missing")
 NO_SPACE_FOR_BACKUP = define(
     "records.no_space_for_backup",
     "{path}: {free} bytes are free, the backup takes {wanted}",
-    path=Name(),
     free=Number(0),
     wanted=Number(0),
 )
@@ -232,11 +184,10 @@ MOVE_AWAY = define("records.move_away", "move it away, or set another home")
 SEE_LOG = define("records.see_log", "see the log")
 REPORT_FAULT = define("records.report_fault", "this is a fault of the program: report it with the log")
 STOP_OTHER = define("records.stop_other", "stop that one, or set another home")
-FIND_OLD = define("records.find_old", "look for the old one; its images are in {folder}", folder=Name())
+FIND_OLD = define("records.find_old", "look for the old one; its images are in {folder}")
 RECOVER_OLD = define(
     "records.recover_old",
     "the old one and its images are in {folder}: `sqlite3 FILE .recover` reads what is left of it",
-    folder=Name(),
 )
 CONTINUE_AFTER = define(
     "records.continue_after",
@@ -250,9 +201,7 @@ CHECK_DISK = define("records.check_disk", "check the disk, or raise records.dead
 CHECK_DISK_AND_REPEAT = define("records.check_disk_and_repeat", "check the disk, or ask again")
 USE_NEWER = define("records.use_newer", "use the version that made it")
 INSTALL_NEWER = define(
-    "records.install_newer",
-    "install that version again, or put back the copy in {folder} that this version made",
-    folder=Name(),
+    "records.install_newer", "install that version again, or put back the copy in {folder} that this version made"
 )
 INSTALL_EARLIER = define(
     "records.install_earlier", "it is as it was; install the earlier version again and report this"
@@ -260,7 +209,6 @@ INSTALL_EARLIER = define(
 INSTALL_EARLIER_COPY = define(
     "records.install_earlier_copy",
     "it is as it was; install the earlier version again and report this; a copy of it is {path}",
-    path=Name(),
 )
 REPLACE_KEY = define(
     "records.replace_key",
@@ -288,8 +236,8 @@ CORRECT_LOT = define(
 )
 HOLDS_SHOW = define("records.holds_show", "`station records holds` lists those that are")
 GIVE_REASON = define("records.give_reason", "give a reason, for those who read it later")
-PROPER_WORD = define("records.proper_word", "give a proper {field}", field=Name())
-SHORTER_TEXT = define("records.shorter_text", "give a shorter {field}, without control characters", field=Name())
+PROPER_WORD = define("records.proper_word", "give a proper {field}")
+SHORTER_TEXT = define("records.shorter_text", "give a shorter {field}, without control characters")
 OPEN_ANOTHER = define("records.open_another", "open another one")
 OPEN_ANOTHER_STEP = define("records.open_another_step", "open another step")
 WHAT_IS_KEPT = define(
@@ -297,7 +245,7 @@ WHAT_IS_KEPT = define(
     "open another one; records.images_quota_mb and records.accepted_share decide what is kept",
 )
 OLDEST_GO_FIRST = define("records.oldest_go_first", "the oldest images make room for new ones")
-LOOK_AT_FILE = define("records.look_at_file", "look at {path}", path=Name())
+LOOK_AT_FILE = define("records.look_at_file", "look at {path}")
 RUN_CHECK = define("records.run_check", "run `station records check`")
 RUN_CHECK_KEEP = define("records.run_check_keep", "run `station records check`; keep the last backup")
 NEW_FOLDER = define("records.new_folder", "name a new folder; a backup never changes another one")

@@ -1,36 +1,34 @@
 """Messages of settings files: recipes, `station.yaml` and environment variables."""
 
-from station.messages.message import Listed, Name, Nested, Number, define, define_plural
+from station.messages.message import Listed, Nested, Number, define, define_plural
 
 # A problem and its place.
 PROBLEMS = define("settings.problems", "{problems}", problems=Listed("\n"))
 PROBLEM = define("settings.problem", "{place}: {field}: {expected}", place=Nested(), field=Nested(), expected=Nested())
 MORE = define("settings.more", "and more: mend these first")
-LINE = define("settings.line", "{file}:{line}", file=Name(), line=Number())
-PATH = define("settings.path", "{path}", path=Name())
+LINE = define("settings.line", "{file}:{line}", line=Number())
+PATH = define("settings.path", "{path}")
 ENVIRONMENT = define("settings.environment", "environment")
 DEFAULT = define("settings.default", "built-in default")
-FIELD = define("settings.field", "{path}", path=Name())
+FIELD = define("settings.field", "{path}")
 FILE = define("settings.file", "file")
 FOLDER = define("settings.folder", "folder")
 
 # A value that its field does not accept.
 EXPECTED = define("settings.expected", "expected {wanted}, got {found}", wanted=Nested(), found=Nested())
 NOTHING = define("settings.nothing", "nothing")
-VALUE = define("settings.value", "{value}", value=Name())
+VALUE = define("settings.value", "{value}")
 A_MAPPING = define("settings.a_mapping", "a mapping")
 A_LIST = define_plural(
     "settings.a_list", "a list of {number} item", "a list of {number} items", "number", number=Number()
 )
-ANOTHER_VALUE = define("settings.another_value", "another value (pydantic: {type})", type=Name())
-UNKNOWN_KEY = define("settings.unknown_key", "unknown key {name}: expected {known}", name=Name(), known=Name())
-UNKNOWN_KEY_NEAR = define(
-    "settings.unknown_key_near", "unknown key {name}: did you mean {near}?", name=Name(), near=Name()
-)
+ANOTHER_VALUE = define("settings.another_value", "another value (pydantic: {type})")
+UNKNOWN_KEY = define("settings.unknown_key", "unknown key {name}: expected {known}")
+UNKNOWN_KEY_NEAR = define("settings.unknown_key_near", "unknown key {name}: did you mean {near}?")
 UNKNOWN_VARIABLE = define(
     "settings.unknown_variable", "unknown variable: see docs/configuration.md for those there are"
 )
-UNKNOWN_VARIABLE_NEAR = define("settings.unknown_variable_near", "unknown variable: did you mean {near}?", near=Name())
+UNKNOWN_VARIABLE_NEAR = define("settings.unknown_variable_near", "unknown variable: did you mean {near}?")
 
 # Files and folders.
 NOT_A_FILE = define("settings.not_a_file", "expected a regular file, got a folder, a pipe or a device")
@@ -38,26 +36,24 @@ NOT_FOUND = define("settings.not_found", "expected a readable file: there is non
 NOT_PERMITTED = define(
     "settings.not_permitted", "expected a readable file: give the station's user the right to read it"
 )
-UNREADABLE = define("settings.unreadable", "expected a readable file: {error}", error=Name())
-UNWRITABLE = define("settings.unwritable", "cannot be written: {error}", error=Name())
+UNREADABLE = define("settings.unreadable", "expected a readable file: {error}")
+UNWRITABLE = define("settings.unwritable", "cannot be written: {error}")
 TOO_LARGE = define(
     "settings.too_large", "expected at most {limit_kib} KiB, got more: is this the right file?", limit_kib=Number()
 )
-NO_FOLDER = define("settings.no_folder", "expected a folder of recipes: {error}", error=Name())
+NO_FOLDER = define("settings.no_folder", "expected a folder of recipes: {error}")
 NO_RECIPES = define("settings.no_recipes", "expected recipes (*.yaml), got none")
 
 # YAML.
-NOT_UTF8 = define("settings.not_utf8", "expected UTF-8 text, got the byte 0x{byte}", byte=Name())
+NOT_UTF8 = define("settings.not_utf8", "expected UTF-8 text, got the byte 0x{byte}")
 NOT_PRINTABLE = define("settings.not_printable", "expected printable text, got a control character")
 NOT_UNICODE = define("settings.not_unicode", "expected characters that exist in Unicode")
-NOT_YAML = define("settings.not_yaml", "expected valid YAML: {error}", error=Name())
+NOT_YAML = define("settings.not_yaml", "expected valid YAML: {error}")
 TAB = define("settings.tab", "expected spaces, got a tab")
 TOO_DEEP = define("settings.too_deep", "expected at most {levels} levels of nesting", levels=Number())
 TOO_MANY = define("settings.too_many", "expected at most {number} keys and values", number=Number())
 NOT_PLAIN = define(
-    "settings.not_plain",
-    "expected a plain value, got {found}: write it out without anchors, aliases and tags",
-    found=Name(),
+    "settings.not_plain", "expected a plain value, got {found}: write it out without anchors, aliases and tags"
 )
 TWICE = define("settings.twice", "expected once, got it again: it is on line {line} already", line=Number())
 KEY = define("settings.key", "expected a key that is a text, got {found}", found=Nested())
@@ -65,23 +61,18 @@ OTHER_SWITCH = define(
     "settings.other_switch",
     'expected a word that all YAML programs read alike, got {word}: write true or false, or "{word}" in quotes for a '
     "text",
-    word=Name(),
 )
 OTHER_NUMBER = define(
     "settings.other_number",
     "expected a word that all YAML programs read alike, got {word}: write a number of at most {digits} decimal digits "
     'without exponent and leading zeros, or "{word}" in quotes for a text',
-    word=Name(),
     digits=Number(),
 )
 OTHER_WORD = define(
     "settings.other_word",
     'expected a word that all YAML programs read alike, got {word}: write "{word}" in quotes for a text',
-    word=Name(),
 )
-NOT_EDITABLE = define(
-    "settings.not_editable", "expected text that can be changed with its comments kept: {error}", error=Name()
-)
+NOT_EDITABLE = define("settings.not_editable", "expected text that can be changed with its comments kept: {error}")
 
 # Recipes: files.
 NEWER_SCHEMA = define(
@@ -90,13 +81,9 @@ NEWER_SCHEMA = define(
     known=Number(),
     found=Number(),
 )
-RECIPE_TWICE = define(
-    "settings.recipe_twice", "expected one recipe with {value}, but {file} has it too", value=Name(), file=Name()
-)
+RECIPE_TWICE = define("settings.recipe_twice", "expected one recipe with {value}, but {file} has it too")
 NO_SUCH_VALUE = define(
-    "settings.no_such_value",
-    "{path}: expected the path of a value in the recipe's file, as damage.area[0].area_mm2",
-    path=Name(),
+    "settings.no_such_value", "{path}: expected the path of a value in the recipe's file, as damage.area[0].area_mm2"
 )
 
 # Recipes: values that do not fit together.
@@ -107,9 +94,7 @@ PRINTABLE = define(
 LESS_THAN = define(
     "settings.less_than",
     "expected less than {field}, {limit}{unit}, got {value}",
-    field=Name(),
     limit=Number(),
-    unit=Name(),
     value=Number(),
 )
 WIDTH_MISSING = define("settings.width_missing", "expected a width, as start is 'width'")
@@ -196,11 +181,8 @@ PORT_TAKEN = define(
     "settings.port_taken",
     "expected a port of its own, got {port}, which {other} is too",
     port=Number(),
-    other=Name(),
 )
-ONE_AXIS = define(
-    "settings.one_axis", "image_right and image_down: expected two axes, got {axis} for both", axis=Name()
-)
+ONE_AXIS = define("settings.one_axis", "image_right and image_down: expected two axes, got {axis} for both")
 BRAKES_TOO_LONG = define(
     "settings.brakes_too_long",
     "braking from {speed} rad/s at {deceleration} rad/s² takes {braking_s} s, and the watchdog at {watchdog_hz} Hz "
@@ -219,9 +201,7 @@ NO_STROKE_LEFT = define(
     stroke_mm=Number(1),
 )
 TLS_WITHOUT_FILES = define(
-    "settings.tls_without_files",
-    "TLS is enabled without {files}: name the PEM files or set enabled: false",
-    files=Name(),
+    "settings.tls_without_files", "TLS is enabled without {files}: name the PEM files or set enabled: false"
 )
 PASSWORD_WITHOUT_USER = define(
     "settings.password_without_user", "mqtt.password_file is given without mqtt.user: name the user that it is of"
@@ -253,14 +233,12 @@ COUNT_TOO_STRICT = define(
 NO_MULTICAST = define(
     "settings.no_multicast",
     "channel is '{channel}' and has to be a multicast address, such as 239.74.163.2, for the interface udp_multicast",
-    channel=Name(),
 )
 NO_INTERFACE = define(
     "settings.no_interface",
     "channel is '{channel}' and has to be the name of a network interface, such as can0, for the interface socketcan",
-    channel=Name(),
 )
 
 # Migration of an earlier configuration.
-MOVED_TWICE = define("settings.moved_twice", "is {new} now, which is there too: keep one of them, as {new}", new=Name())
+MOVED_TWICE = define("settings.moved_twice", "is {new} now, which is there too: keep one of them, as {new}")
 NO_NAMES = define("settings.no_names", "expected settings by their names")

@@ -1,10 +1,10 @@
 """Messages of the what-if: why a draft's result is not known, and what is wrong with its input."""
 
-from station.messages.message import Name, Number, define
+from station.messages.message import Number, define
 
 # Why the draft's outcome of an inspection is not known.
 OLD_RECIPE = define("whatif.old_recipe", "this version does not accept the inspection's own recipe")
-PRESSES_OTHERWISE = define("whatif.presses_otherwise", "the draft presses otherwise ({fields})", fields=Name())
+PRESSES_OTHERWISE = define("whatif.presses_otherwise", "the draft presses otherwise ({fields})")
 FIRST_IMAGES_NOT_KEPT = define(
     "whatif.first_images_not_kept",
     "the draft measures otherwise, and of a fruit that was pressed twice the first images are not kept",
@@ -32,49 +32,31 @@ CURVE_STOPPED = define(
 )
 
 # The table of marks.
-UNREADABLE = define("whatif.unreadable", "{path}: cannot be read: {words}", path=Name(), words=Name())
-NOT_UTF8 = define("whatif.not_utf8", "{path}: expected UTF-8; save the table as CSV UTF-8", path=Name())
-TOO_LARGE = define("whatif.too_large", "{path}: expected at most {most} bytes", path=Name(), most=Number(0))
-NO_HEADER = define("whatif.no_header", "{path}:1: expected the header sequence,mark", path=Name())
-MARKED_TWICE = define("whatif.marked_twice", "{place}: {number} is marked good and bad", place=Name(), number=Number(0))
-NO_TABLE = define("whatif.no_table", "{place}: not a CSV table: {words}", place=Name(), words=Name())
-BAD_NUMBER = define(
-    "whatif.bad_number", "{place}: sequence: expected an inspection's number, got {text}", place=Name(), text=Name()
-)
-BAD_MARK = define("whatif.bad_mark", "{place}: mark: expected good or bad, got {text}", place=Name(), text=Name())
+UNREADABLE = define("whatif.unreadable", "{path}: cannot be read: {words}")
+NOT_UTF8 = define("whatif.not_utf8", "{path}: expected UTF-8; save the table as CSV UTF-8")
+TOO_LARGE = define("whatif.too_large", "{path}: expected at most {most} bytes", most=Number(0))
+NO_HEADER = define("whatif.no_header", "{path}:1: expected the header sequence,mark")
+MARKED_TWICE = define("whatif.marked_twice", "{place}: {number} is marked good and bad", number=Number(0))
+NO_TABLE = define("whatif.no_table", "{place}: not a CSV table: {words}")
+BAD_NUMBER = define("whatif.bad_number", "{place}: sequence: expected an inspection's number, got {text}")
+BAD_MARK = define("whatif.bad_mark", "{place}: mark: expected good or bad, got {text}")
 
 # Where results are stored, and who computes them.
-OUT_NOT_WRITABLE = define(
-    "whatif.out_not_writable", "--out {folder}: cannot be written: {words}", folder=Name(), words=Name()
-)
+OUT_NOT_WRITABLE = define("whatif.out_not_writable", "--out {folder}: cannot be written: {words}")
 OTHER_DRAFT = define(
-    "whatif.other_draft",
-    "--out {folder}: it holds the results of another draft or version; give another folder",
-    folder=Name(),
+    "whatif.other_draft", "--out {folder}: it holds the results of another draft or version; give another folder"
 )
 RESULTS_NOT_WRITTEN = define(
-    "whatif.results_not_written",
-    "{path}: {words}; free space, and the same command continues",
-    path=Name(),
-    words=Name(),
+    "whatif.results_not_written", "{path}: {words}; free space, and the same command continues"
 )
 NO_CLUSTER_EXTRA = define(
     "whatif.no_cluster_extra", "--scheduler: install the extra first: pip install fruit-station[cluster]"
 )
-NO_SCHEDULER = define(
-    "whatif.no_scheduler",
-    "--scheduler {address}: no Dask scheduler answers there: {words}",
-    address=Name(),
-    words=Name(),
-)
+NO_SCHEDULER = define("whatif.no_scheduler", "--scheduler {address}: no Dask scheduler answers there: {words}")
 NO_WORKERS = define(
-    "whatif.no_workers",
-    "--scheduler {address}: it has no workers; start some with `dask worker {address}`",
-    address=Name(),
+    "whatif.no_workers", "--scheduler {address}: it has no workers; start some with `dask worker {address}`"
 )
-BAD_SCHEDULER = define(
-    "whatif.bad_scheduler", "--scheduler {address}: expected tcp://HOST:PORT or tls://HOST:PORT", address=Name()
-)
+BAD_SCHEDULER = define("whatif.bad_scheduler", "--scheduler {address}: expected tcp://HOST:PORT or tls://HOST:PORT")
 PROCESS_ENDED = define(
     "whatif.process_ended",
     "a process of the what-if was ended from outside, perhaps for want of memory; the same command continues where it "

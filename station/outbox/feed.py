@@ -77,7 +77,6 @@ def read_batch(folder: Path, station: str, after: int, limit: int = LARGEST_BATC
 
     Args:
         after: the last entry that was published.
-        limit: at most so many entries.
 
     Raises:
         RecordsError: there are no records yet, or they cannot be read.

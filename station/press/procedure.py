@@ -80,7 +80,6 @@ async def take_step(rig: Rig, recipe: Recipe, number: int, width_mm: float) -> S
     """Go to a width, let fruit and gel settle, and take the recipe's frames.
 
     Args:
-        number: of the step.
         width_mm: the width to ask for; less than 0 is 0.
     """
     move = await rig.close_to(width_mm)

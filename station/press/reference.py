@@ -123,7 +123,6 @@ def check_reference(image: Image, golden: PreparedReference | None, settings: Re
     Args:
         image: the median of frames taken with nothing touching the gel, shape (height, width, 3), dtype uint8.
         golden: None if there is none yet.
-        settings: limits for a good reference.
 
     Raises:
         BadReferenceError: it is not good enough.

@@ -62,7 +62,6 @@ class RecipeEditor:
 
         Args:
             text: YAML; an exported text names its base version in its first lines.
-            person: the editor, and the reason.
             base: as for `edit`; empty for the one that the text names.
 
         Raises:
@@ -93,7 +92,6 @@ class RecipeEditor:
         """Put a revision's text back into the recipe's file; the present text is stored as a backup.
 
         Args:
-            person: the editor, and the reason.
             revision: None for the approved one.
 
         Raises:
@@ -113,9 +111,6 @@ class RecipeEditor:
 
     def upgrade(self, person: Person) -> list[tuple[Path, int]]:
         """Convert every file of an earlier schema to this program's, comments included, with a backup.
-
-        Args:
-            person: the editor, and the reason.
 
         Returns:
             The files written, and the schema versions that they had.

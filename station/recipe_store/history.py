@@ -40,9 +40,6 @@ def submit(connection: Connection, text: str, recipe: Recipe, person: Person) ->
 
     Args:
         connection: in a write transaction.
-        text: the file's.
-        recipe: the parsed text.
-        person: the author.
 
     Raises:
         RecipeStoreError: it is approved already, or another person's draft waits.
@@ -76,7 +73,6 @@ def approve(connection: Connection, wanted: Revision, file: Recipe | None, perso
         connection: in a write transaction.
         wanted: the draft, as the approver has seen it.
         file: the recipe's file now; None if it is invalid.
-        person: the approver.
 
     Raises:
         RecipeStoreError: it is no draft any more, or the approver's own, or its PLC number is another recipe's.
@@ -120,7 +116,6 @@ def retire(connection: Connection, wanted: Revision, person: Person) -> Revision
     Args:
         connection: in a write transaction.
         wanted: a draft or an approved one.
-        person: who retires it, and why.
 
     Raises:
         RecipeStoreError: it is retired already.
@@ -138,8 +133,6 @@ def store_approved(
 
     Args:
         connection: in a write transaction.
-        text: its file's.
-        recipe: the parsed text.
         origin: shipped or adopted.
         who: the distribution, or the station.
         reason: why it counts as approved.

@@ -50,9 +50,6 @@ class RecipeStore(RecipeReader):
     def submit(self, name: str, person: Person) -> Revision:
         """Store the recipe's file as a draft for another person to approve.
 
-        Args:
-            person: its author.
-
         Raises:
             BadInputError: there is no valid file of that recipe.
             RecipeStoreError: it is approved already, or another person's draft waits.
@@ -87,7 +84,6 @@ class RecipeStore(RecipeReader):
         """Take a revision out of use: no lot begins with it any more.
 
         Args:
-            person: who retires it, and why.
             revision: None for the approved one.
 
         Raises:

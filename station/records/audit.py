@@ -128,7 +128,6 @@ def append_restored(connection: Connection, by: str, known: Head | None, new: di
     """Append, after a restored backup's last row, a row that records the restore; known newer rows leave a gap.
 
     Args:
-        connection: in a write transaction on the restored database.
         by: the person's name.
         known: the head of the trail before the restore; None if there was none.
         new: what the row records of the backup.
@@ -202,15 +201,9 @@ def _named(head: Head | AuditRow | None) -> dict[str, Any] | None:
 
 def _append(connection: Connection, entry: AuditEntry, last: AuditRow | None, seq: int | None) -> AuditRow:
     row = AuditRow(
+        **asdict(replace(entry, old=canonical(entry.old), new=canonical(entry.new))),
         seq=seq or (last.seq + 1 if last else 1),
         utc_ms=utc_ms(),
-        who=entry.who,
-        role=entry.role,
-        action=entry.action,
-        subject=entry.subject,
-        reason=entry.reason,
-        old=canonical(entry.old),
-        new=canonical(entry.new),
         previous_hash=last.hash if last else GENESIS,
         hash="",
     )

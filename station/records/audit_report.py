@@ -19,7 +19,6 @@ def read_audit(connection: Connection, number: int, action: str = "", subject: s
     """Read the last rows, oldest first.
 
     Args:
-        number: at most so many.
         action: rows of this action, or of all that start with it; if empty, all but the seals of inspections.
         subject: rows with this text in their subject; all if empty.
     """

@@ -220,25 +220,17 @@ def _copied(folder: Path, partial: Path) -> Manifest:
 
 def _audit_head(folder: Path, path: Path, known: Head | None) -> tuple[str, tuple[str, ...]]:
     """Return the copied trail's last row, and whether it lacks rows that existed before the copy."""
-    engine = open_engine(path, "ro")
-    try:
-        with engine.connect() as connection:
-            head = newer_head(connection, None)
-            cut = known is not None and not has_row(connection, known)
-    finally:
-        engine.dispose()
+    with open_engine(path, "ro").connect() as connection:
+        head = newer_head(connection, None)
+        cut = known is not None and not has_row(connection, known)
     note = "the audit trail lacks rows that it had: see `station audit verify`"
     return str(signed_head(folder, head)) if head else "", (note,) if cut else ()
 
 
 def _copy_images(folder: Path, partial: Path) -> tuple[int, tuple[str, ...], list[str]]:
     """Copy the images that the copied database refers to; the quota may have removed some since."""
-    engine = open_engine(partial / FILE_NAME, "ro")
-    try:
-        with engine.connect() as connection:
-            wanted = referred(connection)
-    finally:
-        engine.dispose()
+    with open_engine(partial / FILE_NAME, "ro").connect() as connection:
+        wanted = referred(connection)
     size_bytes, missing, damaged = 0, list[str](), list[str]()
     for sha256, size in wanted.items():
         try:

@@ -28,16 +28,14 @@ BUSY_MS = 1000
 
 
 def records_folder(home: Path) -> Path:
-    """Return the records' folder.
-
-    Args:
-        home: the station's home folder.
-    """
+    """Return the records' folder."""
     return home / "records"
 
 
 def open_engine(path: Path, mode: Literal["ro", "rw", "rwc"]) -> Engine:
     """Make an engine with write-ahead logging, durable commits and real transactions.
+
+    It pools no connection, so that nothing of it is left to be closed.
 
     Args:
         mode: read only, read and write, or made if missing.
@@ -72,7 +70,6 @@ def check(path: Path, within_s: float = CHECK_S) -> None:
 
     Args:
         path: the database, which exists.
-        within_s: longest time.
 
     Raises:
         DamagedError: it is damaged.

@@ -33,8 +33,7 @@ def direct_transaction(folder: Path) -> Iterator[Connection]:
     try:
         _make_ready(folder)
         head = read_head(folder)
-        engine = open_engine(path, "rw")
-        with engine.connect() as connection:
+        with open_engine(path, "rw").connect() as connection:
             with connection.begin():
                 continue_audit(connection, head)
                 yield connection
@@ -55,10 +54,6 @@ def _make_ready(folder: Path) -> None:
         path = folder / FILE_NAME
         if path.exists() and path.stat().st_size:
             check(path)
-        engine = open_engine(path, "rwc")
-        try:
-            migrate(engine, folder)
-        finally:
-            engine.dispose()
+        migrate(open_engine(path, "rwc"), folder)
     finally:
         os.close(lock)

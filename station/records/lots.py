@@ -1,9 +1,8 @@
 """Lots as people or the packhouse's system register them: grower, start and end."""
 
-from typing import NamedTuple
-
 from sqlalchemy import Connection, insert, select, update
 
+from station.channel.panel_queries import LotView
 from station.messages import records as messages
 from station.records.clock import utc_ms
 from station.records.errors import RecordsError
@@ -14,24 +13,11 @@ LONGEST_NAME = 32
 """As the PLC gives it: `station.channel.line.Begin.lot`."""
 
 
-class Lot(NamedTuple):
-    """One lot."""
-
-    name: str
-    grower: str
-    began_utc_ms: int
-    ended_utc_ms: int | None
-    """None while it runs."""
-    revision: int
-    """Counts the changes, from 1."""
-
-
-def start_lot(connection: Connection, name: str, grower: str, *, correct: bool = False) -> Lot:
+def start_lot(connection: Connection, name: str, grower: str, *, correct: bool = False) -> LotView:
     """Register a lot's start. Idempotent.
 
     Args:
         name: as the PLC gives it with each trigger.
-        grower: grower of the fruit.
         correct: replace the grower registered before.
 
     Raises:
@@ -54,7 +40,7 @@ def start_lot(connection: Connection, name: str, grower: str, *, correct: bool =
     return _changed(connection, name)
 
 
-def end_lot(connection: Connection, name: str) -> Lot:
+def end_lot(connection: Connection, name: str) -> LotView:
     """Register a lot's end. Idempotent.
 
     Raises:
@@ -69,11 +55,10 @@ def end_lot(connection: Connection, name: str) -> Lot:
     return _changed(connection, name)
 
 
-def read_lots(connection: Connection, limit: int, grower: str | None = None, name: str | None = None) -> list[Lot]:
+def read_lots(connection: Connection, limit: int, grower: str | None = None, name: str | None = None) -> list[LotView]:
     """Read the registered lots, newest first.
 
     Args:
-        limit: at most so many.
         grower: all growers by default.
         name: only the lot of this name.
     """
@@ -81,23 +66,23 @@ def read_lots(connection: Connection, limit: int, grower: str | None = None, nam
     for column, wanted in ((lots.c.grower, grower), (lots.c.name, name)):
         if wanted is not None:
             query = query.where(column == wanted)
-    return [Lot(*row) for row in connection.execute(query)]
+    return [LotView(**row._asdict()) for row in connection.execute(query)]
 
 
 _COLUMNS = (lots.c.name, lots.c.grower, lots.c.began_utc_ms, lots.c.ended_utc_ms, lots.c.revision)
 
 
-def _known(connection: Connection, name: str) -> Lot | None:
+def _known(connection: Connection, name: str) -> LotView | None:
     row = connection.execute(select(*_COLUMNS).where(lots.c.name == name)).one_or_none()
-    return None if row is None else Lot(*row)
+    return None if row is None else LotView(**row._asdict())
 
 
-def _change(connection: Connection, lot: Lot, **values: object) -> None:
+def _change(connection: Connection, lot: LotView, **values: object) -> None:
     connection.execute(update(lots).where(lots.c.name == lot.name).values(**values, revision=lot.revision + 1))
 
 
-def _changed(connection: Connection, name: str) -> Lot:
+def _changed(connection: Connection, name: str) -> LotView:
     """Return the lot in its present state, and queue it for other systems."""
-    row = connection.execute(select(lots.c.id, *_COLUMNS).where(lots.c.name == name)).one()
-    queue_event(connection, "lot", row.id)
-    return Lot(*row[1:])
+    columns = connection.execute(select(lots.c.id, *_COLUMNS).where(lots.c.name == name)).one()._asdict()
+    queue_event(connection, "lot", columns.pop("id"))
+    return LotView(**columns)

@@ -27,7 +27,6 @@ def place_mark(connection: Connection, sequence: int, mark: Mark | None, by: str
 
     Args:
         mark: None removes it.
-        by: the person's name.
 
     Returns:
         The mark before; None if there was none.

@@ -93,7 +93,6 @@ def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
     """Open the records; the folder is locked by the caller. Blocks.
 
     Args:
-        settings: for the images.
         boot: name of this start of the station.
 
     Raises:
@@ -149,15 +148,12 @@ def _lost_mark(mark: HighWaterMark) -> SequenceError:
 
 def _migrate(folder: Path) -> None:
     """Migrate the schema."""
-    engine = open_engine(folder / FILE_NAME, "rwc")
     try:
-        migrate(engine, folder)
+        migrate(open_engine(folder / FILE_NAME, "rwc"), folder)
     except RecordsError:
         raise
     except Exception as error:
         raise map_error(error, str(folder / FILE_NAME)) from error
-    finally:
-        engine.dispose()
 
 
 def _connector(

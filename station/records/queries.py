@@ -3,10 +3,11 @@
 import json
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
-from sqlalchemy import Connection, func, select
+from sqlalchemy import Connection, Row, func, select
 
 from station.channel.line import Outcome, OutcomeName
 from station.messages import records as messages
@@ -26,6 +27,8 @@ from station.records.model import (
 )
 from station.records.schema import alarms, alarms_log, curve_points, images, inspections, recipe_snapshots
 from station.records.stored_message import FIRST_PRESS, JUDGEMENT, from_stored, images_state_of
+
+Stored = TypeVar("Stored", CurvePoint, InspectionRecord, RecipeSnapshot, StoredImage, Trigger)
 
 
 class Summary(NamedTuple):
@@ -66,11 +69,7 @@ def read_alarms(connection: Connection) -> tuple[AlarmRow, ...]:
 
 
 def read_alarm_log(connection: Connection, limit: int) -> tuple[AlarmEntry, ...]:
-    """Read the log of alarms, newest first.
-
-    Args:
-        limit: at most so many.
-    """
+    """Read the log of alarms, newest first."""
     columns = (alarms_log.c.utc_ms, alarms_log.c.id, alarms_log.c.change, alarms_log.c.detail, alarms_log.c.sequence)
     rows = connection.execute(select(*columns).order_by(alarms_log.c.row.desc()).limit(limit))
     return tuple(AlarmEntry(*row) for row in rows)
@@ -96,26 +95,14 @@ def read_inspection(connection: Connection, sequence: int, folder: Path) -> Full
     standing = None if row.standing is None else Outcome.model_validate_json(row.standing)
     return FullRecord(
         sequence=sequence,
-        trigger=Trigger(
-            row.trigger_id,
-            row.encoder,
-            row.lot,
-            row.began_utc_ms,
-            _recipe(connection, row),
-            row.simulated,
-            row.fruit_length_mm_x10,
-            row.size_class,
-        ),
+        trigger=_made(Trigger, row, recipe=_recipe(connection, row)),
         boot=row.boot,
         judged=_judged(connection, row),
         standing=standing,
         published_utc_ms=row.published_utc_ms,
         acknowledged_utc_ms=row.acknowledged_utc_ms,
         images=tuple(
-            StoredImage(
-                image.kind, image.step, image.sha256, image.size_bytes, str(image_path(folder, image.sha256).absolute())
-            )
-            for image in kept
+            _made(StoredImage, image, path=str(image_path(folder, image.sha256).absolute())) for image in kept
         ),
         images_state=images_state_of(row.images_state),
     )
@@ -153,7 +140,7 @@ def _recipe(connection: Connection, row: Any) -> RecipeSnapshot | None:
     if row.recipe_sha256 is None:
         return None
     found = connection.execute(select(recipe_snapshots).where(recipe_snapshots.c.sha256 == row.recipe_sha256)).one()
-    return RecipeSnapshot(found.name, found.number, found.revision, found.text)
+    return _made(RecipeSnapshot, found)
 
 
 def _judged(connection: Connection, row: Any) -> InspectionRecord | None:
@@ -167,37 +154,20 @@ def _judged(connection: Connection, row: Any) -> InspectionRecord | None:
         None if (stored := measures.pop(name, None)) is None else from_stored(stored)
         for name in (JUDGEMENT, FIRST_PRESS)
     )
-    return InspectionRecord(
+    return _made(
+        InspectionRecord,
+        row,
         outcome=row.judged,
         reasons=tuple(row.reasons),
         explanation=tuple(map(from_stored, row.explanation)),
-        late=row.late,
-        partial=row.partial,
-        area_mm2=row.area_mm2,
-        area_px=row.area_px,
-        closing_mm=row.closing_mm,
-        confidence=row.confidence,
-        ended_utc_ms=row.ended_utc_ms,
-        duration_ms=row.duration_ms,
-        curve=tuple(
-            CurvePoint(
-                point.step,
-                point.width_mm,
-                point.closing_mm,
-                point.area_mm2,
-                point.area_px,
-                point.confidence,
-                tuple(point.flags),
-                point.captured_s,
-                point.changed_area_mm2,
-                point.changed_area_px,
-            )
-            for point in points
-        ),
-        phases_s=row.phases_s,
+        curve=tuple(_made(CurvePoint, point, flags=tuple(point.flags)) for point in points),
         measures=measures,
         judgement=judgement,
         first_press_findings=first_press,
-        devices=row.devices,
-        versions=row.versions,
     )
+
+
+def _made(kind: type[Stored], row: Row[Any], **others: Any) -> Stored:
+    """Make a dataclass from a row's columns of the same names; `others` have no column, or another value than its."""
+    columns = row._asdict()
+    return kind(**{each.name: columns[each.name] for each in fields(kind) if each.name in columns} | others)

@@ -92,12 +92,8 @@ def _copied(directory: Path, new: Path, manifest: Manifest) -> None:
         faults = check_schema(connection) or list(integrity(connection))
     if faults:
         raise DamagedError(messages.BAD_FILE(path=str(source), words=faults[0]), messages.TAKE_ANOTHER())
-    engine = open_engine(path, "rw")
-    try:
-        with engine.connect() as connection:
-            wanted = referred(connection)
-    finally:
-        engine.dispose()
+    with open_engine(path, "rw").connect() as connection:
+        wanted = referred(connection)
     for sha256 in wanted.keys() - set(manifest.missing):
         try:
             copy_image(image_path(directory, sha256), image_path(new, sha256), sha256, wanted[sha256])
@@ -128,8 +124,6 @@ def _continue(folder: Path, new: Path, manifest: Manifest, by: str) -> None:
         raise
     except Exception as error:
         raise map_error(error, str(new / FILE_NAME)) from error
-    finally:
-        engine.dispose()
     with closing(sqlite3.connect(new / FILE_NAME)) as connection:
         connection.execute("PRAGMA journal_mode = DELETE")
     with (new / FILE_NAME).open("rb") as file:

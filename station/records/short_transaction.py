@@ -24,9 +24,8 @@ def short_transaction(folder: Path) -> Iterator[Connection]:
     path = folder / FILE_NAME
     if not path.exists():
         raise RecordsError(messages.NO_RECORDS(path=str(path)), messages.GIVE_HOME())
-    engine = open_engine(path, "rw")
     try:
-        with engine.begin() as connection:
+        with open_engine(path, "rw").begin() as connection:
             yield connection
             head = newer_head(connection, read_head(folder))
         if head is not None:
@@ -35,5 +34,3 @@ def short_transaction(folder: Path) -> Iterator[Connection]:
         raise
     except Exception as error:
         raise map_error(error, str(path)) from error
-    finally:
-        engine.dispose()

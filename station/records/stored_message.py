@@ -23,11 +23,7 @@ _IMAGES_BEFORE_MESSAGES = {
 
 
 def images_state_of(text: str) -> Message | None:
-    """Return the state of an inspection's images; None of one that runs.
-
-    Args:
-        text: as it is stored.
-    """
+    """Return the state of an inspection's images; None of one that runs."""
     return _IMAGES_BEFORE_MESSAGES.get(text) or message_in(text)
 
 

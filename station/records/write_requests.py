@@ -1,7 +1,7 @@
 """Write requests of the records, each a function of the writer's connection."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, Literal
 
 from pydantic import ValidationError
@@ -30,6 +30,19 @@ from station.records.search_index import index_hour, index_reasons
 from station.records.stored_message import FIRST_PRESS, JUDGEMENT, to_stored
 
 OutboxKind = Literal["inspection", "lot", "audit"]
+_BEGUN = (
+    "sequence",
+    "trigger_id",
+    "encoder",
+    "lot",
+    "recipe_number",
+    "recipe_checksum",
+    "simulated",
+    "began_utc_ms",
+    "fruit_length_mm_x10",
+    "size_class",
+)
+"""What is known of an inspection when it begins: columns of its row and fields of its outcome."""
 _PENDING = (text_of(messages.IMAGES_PENDING()), "pending")  # the second: of versions before messages
 
 
@@ -41,27 +54,15 @@ def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot
     """
     recipe = trigger.recipe
     if recipe is not None:
-        snapshot = {
-            "sha256": recipe.sha256,
-            "name": recipe.name,
-            "number": recipe.number,
-            "revision": recipe.revision,
-            "checksum": recipe.checksum,
-            "text": recipe.text,
-        }
+        snapshot = {**asdict(recipe), "sha256": recipe.sha256, "checksum": recipe.checksum}
         connection.execute(upsert(recipe_snapshots).values(snapshot).on_conflict_do_nothing())
     begun = {
+        **asdict(replace(trigger, recipe=None)),
         "sequence": sequence,
-        "trigger_id": trigger.trigger_id,
-        "encoder": trigger.encoder,
-        "lot": trigger.lot,
         "recipe_number": recipe.number if recipe else 0,
         "recipe_checksum": recipe.checksum if recipe else 0,
-        "simulated": trigger.simulated,
-        "began_utc_ms": trigger.began_utc_ms,
-        "fruit_length_mm_x10": trigger.fruit_length_mm_x10,
-        "size_class": trigger.size_class,
     }
+    del begun["recipe"]
     _lost(begun)
     note_skipped(connection, sequence)
     sha256 = recipe.sha256 if recipe else None
@@ -88,7 +89,6 @@ def conclude(
     """Store how an inspection ended, unless it is stored already.
 
     Args:
-        record: its result.
         images_states: state of its images, by the outcome that decides: `PASS` or `other`.
 
     Returns:
@@ -173,7 +173,6 @@ def queue_event(connection: Connection, kind: OutboxKind, row: int) -> None:
 
     Args:
         connection: the writer's, in the transaction of the change.
-        kind: of the row.
         row: its sequence, id or number.
     """
     connection.execute(insert(outbox).values(kind=kind, row=row))
@@ -302,20 +301,8 @@ def _judged(begun: Mapping[str, Any], record: InspectionRecord) -> Outcome:
 
 
 def _outcome(begun: Mapping[str, Any], **ended: Any) -> Outcome:
-    columns = (
-        "sequence",
-        "trigger_id",
-        "encoder",
-        "lot",
-        "recipe_number",
-        "recipe_checksum",
-        "simulated",
-        "began_utc_ms",
-        "fruit_length_mm_x10",
-        "size_class",
-    )
     try:
-        return Outcome(**{name: begun[name] for name in columns}, **ended)
+        return Outcome(**{name: begun[name] for name in _BEGUN}, **ended)
     except ValidationError as error:
         raise BadRecordError(
             messages.BAD_INSPECTION(number=begun["sequence"], words=str(error)), messages.SEE_LOG()
@@ -326,19 +313,8 @@ def _insert_published(connection: Connection, outcome: Outcome, boot: str) -> No
     """Insert an inspection of which only the outcome is known: it began in a database that was moved aside."""
     connection.execute(
         insert(inspections).values(
-            sequence=outcome.sequence,
+            **outcome.model_dump(include={*_BEGUN, "ended_utc_ms", "duration_ms"}),
             boot=boot,
-            trigger_id=outcome.trigger_id,
-            encoder=outcome.encoder,
-            lot=outcome.lot,
-            recipe_number=outcome.recipe_number,
-            recipe_checksum=outcome.recipe_checksum,
-            simulated=outcome.simulated,
-            began_utc_ms=outcome.began_utc_ms,
-            ended_utc_ms=outcome.ended_utc_ms,
-            duration_ms=outcome.duration_ms,
-            fruit_length_mm_x10=outcome.fruit_length_mm_x10,
-            size_class=outcome.size_class,
             images_state=text_of(messages.IMAGES_NONE()),
         )
     )

@@ -116,7 +116,6 @@ class GuardedListener(socket.socket):
 
     Args:
         family: of `socket`.
-        limits: numbers of connections.
         known: returns whether an address may use the reserve.
     """
 

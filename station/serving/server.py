@@ -28,7 +28,6 @@ class Server(uvicorn.Server):
 
     Args:
         listener: guards its connections.
-        app: the application.
         options: of `uvicorn.Config`, in addition.
     """
 
@@ -81,7 +80,6 @@ def listen(
         port: TCP; 0 takes a free one.
         setting: the configuration's section with `host` and `port`.
         what: the service, as `the pages`.
-        limits: numbers of connections.
         known: returns whether an address may use the reserve.
 
     Raises:

@@ -3,6 +3,7 @@
 from typing import Literal
 
 from station.settings.model import Settings, setting
+from station.settings.network import Port
 
 
 class DigitSettings(Settings):
@@ -53,7 +54,7 @@ class TwinCameraSettings(Settings):
     """The simulated DIGIT."""
 
     host: str = setting("127.0.0.1", title="Address", description="Address of the twin's camera.", min_length=1)
-    port: int = setting(5030, title="Port", description="TCP port of the twin's camera.", ge=1, le=65535)
+    port: Port = setting(5030, title="Port", description="TCP port of the twin's camera.")
 
 
 class CameraSettings(Settings):

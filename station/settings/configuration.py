@@ -20,7 +20,7 @@ from station.settings.gripper import GripperSettings
 from station.settings.hmi import HmiSettings
 from station.settings.modbus import ModbusSettings
 from station.settings.model import Settings, setting
-from station.settings.network import Host
+from station.settings.network import Host, Port
 from station.settings.outbox import OutboxSettings
 from station.settings.paths import Folder
 from station.settings.plc import HandshakeSettings
@@ -44,12 +44,10 @@ class MetricsSettings(Settings):
         description="Network address on which /metrics, /livez, /readyz and /version are served.",
         max_length=253,
     )
-    port: int = setting(
+    port: Port = setting(
         9108,
         title="Port",
         description="TCP port of metrics and health over HTTP.",
-        ge=1,
-        le=65_535,
     )
 
 

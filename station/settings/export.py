@@ -35,12 +35,7 @@ def exported(root: Path = ROOT) -> dict[Path, str]:
 
 
 def json_schema(model: type[BaseModel], title: str) -> str:
-    """Return a model's JSON Schema as a file.
-
-    Args:
-        model: the settings model.
-        title: the schema's title.
-    """
+    """Return a model's JSON Schema as a file."""
     schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema_of(model), "title": title}
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 

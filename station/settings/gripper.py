@@ -6,6 +6,7 @@ from pydantic import model_validator
 
 from station.messages import settings as messages
 from station.settings.model import Settings, setting
+from station.settings.network import Port
 from station.settings.problems import FieldError
 
 
@@ -62,12 +63,10 @@ class UrcapSettings(Settings):
         min_length=1,
         max_length=253,
     )
-    port: int = setting(
+    port: Port = setting(
         63352,
         title="URCap's port",
         description="TCP port of the URCap's socket; the URCap always uses 63352.",
-        ge=1,
-        le=65535,
     )
 
 
@@ -101,12 +100,10 @@ class ModbusRtuSettings(Settings):
         min_length=1,
         max_length=253,
     )
-    port: int = setting(
+    port: Port = setting(
         54321,
         title="Gateway's port",
         description="TCP port of the gateway; the RS-485 URCap uses 54321.",
-        ge=1,
-        le=65535,
     )
     unit: int = setting(
         9,

@@ -5,12 +5,11 @@ from typing import Literal, Self, get_args
 
 from pydantic import model_validator
 
-from station.errors import BadInputError
 from station.messages import settings as messages
 from station.settings.model import Settings, setting
-from station.settings.network import Host
+from station.settings.network import Host, Port
 from station.settings.paths import File
-from station.settings.plc import LONGEST_SOCKET_PATH
+from station.settings.plc import channel_endpoint
 from station.settings.problems import FieldError
 
 Language = Literal["en", "de", "es"]
@@ -48,7 +47,7 @@ class HmiSettings(Settings):
         description="Network address on which the operators' pages are served.",
         max_length=253,
     )
-    port: int = setting(8080, title="Port", description="TCP port of the operators' pages over HTTP.", ge=1, le=65_535)
+    port: Port = setting(8080, title="Port", description="TCP port of the operators' pages over HTTP.")
     names: tuple[Host, ...] = setting(
         ("127.0.0.1", "localhost"),
         title="Names",
@@ -109,23 +108,8 @@ class HmiSettings(Settings):
 
 
 def panel_endpoint(settings: HmiSettings, home: Path) -> str:
-    """Return the endpoint of the panel's channel.
-
-    Args:
-        settings: with the endpoint, or null for the default.
-        home: the absolute home folder.
-
-    Raises:
-        BadInputError: the path is too long for a socket.
-    """
-    endpoint = settings.endpoint or f"ipc://{home / 'run' / 'panel.ipc'}"
-    path = endpoint.removeprefix("ipc://")
-    if path != endpoint and len(path.encode()) > LONGEST_SOCKET_PATH:
-        raise BadInputError(
-            f"the panel's socket {path} has more than {LONGEST_SOCKET_PATH} bytes, which no UNIX socket's path may: "
-            "choose a shorter home folder, or set hmi.endpoint to a short ipc:// path"
-        )
-    return endpoint
+    """Return the endpoint of the panel's channel; see `channel_endpoint`."""
+    return channel_endpoint(settings.endpoint, home, "panel", "hmi.endpoint")
 
 
 def address_of(settings: HmiSettings) -> str:

@@ -6,7 +6,7 @@ from pydantic import model_validator
 
 from station.messages import settings as messages
 from station.settings.model import Settings, setting
-from station.settings.network import Host, Network
+from station.settings.network import Host, Network, Port
 from station.settings.paths import File
 from station.settings.problems import FieldError
 
@@ -21,12 +21,10 @@ class ModbusTlsSettings(Settings):
         title="Served",
         description="Whether the second port is served; it needs the three files below.",
     )
-    port: int = setting(
+    port: Port = setting(
         5802,
         title="Port",
         description="TCP port of Modbus over TLS; the registered one is 802, which needs the right to bind low ports.",
-        ge=1,
-        le=65_535,
     )
     certificate: File | None = setting(
         None, title="Certificate", description="PEM file with the station's certificate and its chain."
@@ -57,12 +55,10 @@ class ModbusSettings(Settings):
         description="Network address on which Modbus TCP is served; loopback until a site decides otherwise.",
         max_length=253,
     )
-    port: int = setting(
+    port: Port = setting(
         5020,
         title="Port",
         description="TCP port of Modbus; a site sets 502, which needs the right to bind low ports.",
-        ge=1,
-        le=65_535,
     )
     unit: int = setting(
         1,

@@ -4,7 +4,7 @@ import ipaddress
 import re
 from typing import Annotated
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, Field
 
 from station.messages import settings as messages
 from station.settings.problems import WantedError
@@ -35,3 +35,5 @@ Host = Annotated[str, AfterValidator(_host)]
 """An IP address or a host's name."""
 Network = Annotated[str, AfterValidator(_network)]
 """One IP address, or a network in CIDR notation."""
+Port = Annotated[int, Field(ge=1, le=65_535)]
+"""Of TCP."""

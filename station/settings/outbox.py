@@ -6,7 +6,7 @@ from pydantic import model_validator
 
 from station.messages import settings as messages
 from station.settings.model import Settings, setting
-from station.settings.network import Host
+from station.settings.network import Host, Port
 from station.settings.paths import File
 from station.settings.problems import FieldError
 
@@ -22,7 +22,7 @@ class OutboxPostgresqlSettings(Settings):
         min_length=1,
         max_length=253,
     )
-    port: int = setting(5432, title="Port", description="TCP port of the server.", ge=1, le=65_535)
+    port: Port = setting(5432, title="Port", description="TCP port of the server.")
     database: str = setting("fruit", title="Database", description="Its name.", min_length=1, max_length=63)
     user: str = setting("fruit_station", title="User", description="The role that writes.", min_length=1, max_length=63)
     password_file: File | None = setting(
@@ -43,7 +43,7 @@ class OutboxMqttSettings(Settings):
 
     enabled: bool = setting(default=False, title="Published", description="Whether events are published over MQTT.")
     host: Host = setting("127.0.0.1", title="Address", description="Name or address of the broker.", max_length=253)
-    port: int = setting(1883, title="Port", description="TCP port of the broker; 8883 with TLS.", ge=1, le=65_535)
+    port: Port = setting(1883, title="Port", description="TCP port of the broker; 8883 with TLS.")
     topic: str = setting(
         "fruit",
         title="Topic",

@@ -95,20 +95,26 @@ class HandshakeSettings(Settings):
 
 
 def line_endpoint(settings: HandshakeSettings, home: Path) -> str:
-    """Return the endpoint of the line's channel.
+    """Return the endpoint of the line's channel; see `channel_endpoint`."""
+    return channel_endpoint(settings.endpoint, home, "line", "handshake.endpoint")
+
+
+def channel_endpoint(endpoint: str | None, home: Path, name: str, field: str) -> str:
+    """Return the endpoint of a channel.
 
     Args:
-        settings: with the endpoint, or null for the default.
-        home: the absolute home folder.
+        endpoint: as configured; None for a socket of the channel's name in the home folder.
+        home: absolute.
+        field: the setting that names it.
 
     Raises:
         BadInputError: the path is too long for a socket.
     """
-    endpoint = settings.endpoint or f"ipc://{home / 'run' / 'line.ipc'}"
+    endpoint = endpoint or f"ipc://{home / 'run' / name}.ipc"
     path = endpoint.removeprefix("ipc://")
     if path != endpoint and len(path.encode()) > LONGEST_SOCKET_PATH:
         raise BadInputError(
-            f"the line's socket {path} has more than {LONGEST_SOCKET_PATH} bytes, which no UNIX socket's path may: "
-            "choose a shorter home folder, or set handshake.endpoint to a short ipc:// path"
+            f"the {name}'s socket {path} has more than {LONGEST_SOCKET_PATH} bytes, which no UNIX socket's path may: "
+            f"choose a shorter home folder, or set {field} to a short ipc:// path"
         )
     return endpoint

@@ -33,9 +33,6 @@ class Checked(NamedTuple):
 def load_recipe(path: Path) -> Recipe:
     """Read one recipe.
 
-    Args:
-        path: its file.
-
     Raises:
         SettingsError: all problems of the file.
     """
@@ -135,11 +132,7 @@ def approved_list(folder: Path | None = None) -> str:
 
 
 def check_recipes(files: Iterable[Path]) -> Checked:
-    """Read many recipes, including those with errors.
-
-    Args:
-        files: the recipes' files.
-    """
+    """Read many recipes, including those with errors."""
     recipes: dict[Path, Recipe] = {}
     problems: list[Problem] = []
     for path in files:

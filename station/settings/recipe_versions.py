@@ -79,7 +79,6 @@ def rename(values: MutableMapping[str, Any], old: str, new: str) -> None:
     Args:
         values: the mapping that has the field.
         old: its name; a missing field is ignored.
-        new: its new name.
     """
     if old not in values:
         return

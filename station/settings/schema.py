@@ -33,7 +33,6 @@ def resolved(node: Node, root: Node) -> Node:
 
     Args:
         node: a part of `root`.
-        root: the whole schema.
     """
     while "$ref" in node:
         target = root["$defs"][node["$ref"].rpartition("/")[2]]
@@ -46,7 +45,6 @@ def branches(node: Node, root: Node) -> list[Node]:
 
     Args:
         node: a part of `root`.
-        root: the whole schema.
     """
     node = resolved(node, root)
     several = [branch for key in ("anyOf", "oneOf") for branch in node.get(key, ())]
@@ -59,7 +57,6 @@ def find(root: Node, path: Path) -> Node | None:
     """Return the node of a field, or None if the schema has no such field.
 
     Args:
-        root: the whole schema.
         path: keys and positions.
     """
     found = [resolved(root, root)]
@@ -84,7 +81,6 @@ def names(root: Node, path: Path) -> list[str]:
     """Return the names of the fields inside a mapping.
 
     Args:
-        root: the whole schema.
         path: of the mapping.
     """
     node = find(root, path)
@@ -95,7 +91,6 @@ def leaves(root: Node, node: Node | None = None, path: Path = (), *, into_lists:
     """Return all fields that hold a value, in the model's order.
 
     Args:
-        root: the whole schema.
         node: where to begin; the root by default.
         path: the path of `node`.
         into_lists: go on into lists of mappings, whose path then ends in `[]`, and into mappings that may be null.
@@ -115,12 +110,7 @@ def leaves(root: Node, node: Node | None = None, path: Path = (), *, into_lists:
 
 
 def expectation(node: Node, root: Node) -> Message:
-    """Describe the accepted values of a field: `a number from 0.1 to 10 mm`.
-
-    Args:
-        node: the field's node.
-        root: the whole schema.
-    """
+    """Describe the accepted values of a field: `a number from 0.1 to 10 mm`."""
     kinds = dict.fromkeys(_alternative(branch, root) for branch in branches(node, root))
     nullable = any(resolved(each, root).get("type") == "null" for each in node.get("anyOf", ()))
     described = reduce(lambda first, second: messages.EITHER(first=first, second=second), kinds)
@@ -231,20 +221,12 @@ def _length(low: int | None, high: int | None, things: _Counted) -> Message | No
 
 
 def figure(value: float) -> str:
-    """Format a number to six digits, without a needless `.0`.
-
-    Args:
-        value: the number.
-    """
+    """Format a number to six digits, without a needless `.0`."""
     return str(int(value)) if value == int(value) else f"{value:.6g}"
 
 
 def found(value: Any) -> Message:
-    """Describe a value that is not accepted.
-
-    Args:
-        value: anything that a document holds.
-    """
+    """Describe a value that is not accepted."""
     match value:
         case None:
             return settings.NOTHING()

@@ -26,7 +26,6 @@ def validated(model: type[Model], document: Document, value: Any, locate: Locate
     """Validate plain values.
 
     Args:
-        model: the expected model.
         document: the source file; its own problems come first.
         value: mappings, lists, texts, numbers, truth values and None.
         locate: returns the place of a value in the source.

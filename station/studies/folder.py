@@ -116,7 +116,6 @@ class StudyFolder:
 
         Args:
             name: path below the folder.
-            data: the whole content.
 
         Raises:
             StationError: as for `store`.

@@ -46,7 +46,6 @@ def true_area_mm2(fruit: Fruit, pose: Pose, closing_mm: float) -> float:
     """The true area at a true closing, held for a while: what a perfect gauge would say.
 
     Args:
-        fruit: what is pressed.
         pose: how it lies.
         closing_mm: from the true first contact.
     """
@@ -77,7 +76,6 @@ class FruitRig(StationaryRig):
     """A press rig with one fruit between gel and sponge. Its widths are the true ones.
 
     Args:
-        fruit: what is pressed.
         pose: how it lies.
         unit: seed of the sensor's light; None for the unit that the optics were fitted on.
         noise_seed: of the sensor's noise and drift.

@@ -102,9 +102,6 @@ def measure_part(task: GaugeTask) -> Simulated:
     press gives the outcome. If it ended before one step beyond the last damage threshold it continues to there, so that
     the area at that threshold, which is the judge's own, is known; without a contact it is 0 mm².
 
-    Args:
-        task: the part, the operator and the repeat.
-
     Returns:
         The measurement with the truths of `PART_TRUTHS`.
     """

@@ -48,7 +48,6 @@ def analysed(
     Args:
         title: of the report; also the source named in messages.
         facts: names and values for the report.
-        measurements: all of them.
         tolerance: in mm²; None for no tolerance.
 
     Raises:

@@ -144,7 +144,6 @@ class Supervisor:
 
     Args:
         programs: in the order of their start, each when the one before is ready; ended in reverse.
-        environment: theirs.
     """
 
     def __init__(self, programs: Sequence[Program], environment: Mapping[str, str] | None = None) -> None:
@@ -155,11 +154,7 @@ class Supervisor:
         self._fed_s = 0.0
 
     def ready(self, name: str) -> bool:
-        """Return whether a program's present process has reported that it serves.
-
-        Args:
-            name: the program's.
-        """
+        """Return whether a program's present process has reported that it serves."""
         return any(child.ready for child in self._children if child.program.name == name)
 
     async def run(self, on_ready: Callable[[], None], ended: asyncio.Event) -> None:

@@ -38,7 +38,6 @@ def bundle(site: Configuration, target: Path | IO[bytes]) -> tuple[str, ...]:
     """Write the bundle; a part that cannot be had is replaced by the reason, as a station in trouble has few parts.
 
     Args:
-        site: the configuration in force.
         target: the ZIP file to write, or an open one.
 
     Returns:

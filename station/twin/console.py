@@ -120,8 +120,6 @@ def ask(host: str, port: int, request: Mapping[str, Any], timeout_s: float = 3.0
     """Ask a running twin's console one thing.
 
     Args:
-        host: the console's address.
-        port: the console's port.
         request: `do` and what it needs.
         timeout_s: for the connection and for the answer, each.
 

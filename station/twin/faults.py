@@ -70,19 +70,11 @@ class FaultBoard:
             raise ValueError(f"{self.device} has no fault {fault!r}; it knows: {', '.join(self.known)}")
 
     def active(self, fault: str) -> bool:
-        """Whether a fault is switched on.
-
-        Args:
-            fault: the fault's name.
-        """
+        """Whether a fault is switched on."""
         return fault in self._active
 
     def amount(self, fault: str) -> float:
-        """A fault's strength, 0.0 where it is off.
-
-        Args:
-            fault: the fault's name.
-        """
+        """A fault's strength, 0.0 where it is off."""
         return self._active.get(fault, 0.0)
 
     def take_new(self) -> frozenset[str]:

@@ -161,7 +161,6 @@ def draw_fruit(
     """Draw a fruit: sizes with the published mean, spread and correlation, stiffness log-normal.
 
     Args:
-        kind: what to draw.
         seed: the same seed gives the same fruit.
         bruised: damage it where the gel touches.
         damage: how, where it is bruised.

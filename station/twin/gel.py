@@ -129,7 +129,6 @@ def dent_mm(gap_mm: FloatArray, approach_mm: float, surface: Surface, gel: Gel) 
         gap_mm: shape (rows, columns), not negative, 0 at the foremost point.
         approach_mm: how far the foremost point has gone beyond first contact; 0 or less gives no dent.
         surface: the body's curvature.
-        gel: the gel.
 
     Returns:
         Shape as `gap_mm`, dtype float32, mm, positive where the gel is pushed in.

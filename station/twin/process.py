@@ -85,7 +85,6 @@ class Twin:
         """Wire the cell; nothing listens before `start`.
 
         Args:
-            options: what it is and where it listens.
             clock: the twin's time; the machine's where left out.
         """
         clock = clock or SteadyClock()
@@ -206,7 +205,6 @@ async def run(options: TwinOptions, on_started: Callable[[Twin], None]) -> None:
     """Run the twin until SIGINT or SIGTERM.
 
     Args:
-        options: what it is and where it listens.
         on_started: called once every port is open.
 
     Raises:

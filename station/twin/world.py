@@ -34,7 +34,6 @@ class World:
 
     Args:
         clock: the twin's time, for creep.
-        gel: the gel on the sensor.
     """
 
     def __init__(self, clock: Clock, gel: Gel | None = None) -> None:
@@ -65,7 +64,6 @@ class World:
         """Lay a fruit into the nest, in the place of what was there.
 
         Args:
-            fruit: the fruit.
             pose: where it meets the gel; the middle where left out.
             holder_mm: what it lies on takes so much of the room between the fingers.
         """

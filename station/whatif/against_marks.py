@@ -69,7 +69,6 @@ def compared(results: Iterable[Replayed], marks: Mapping[int, Mark]) -> Compared
     """Compare a draft's outcomes with the marks.
 
     Args:
-        results: of a what-if.
         marks: people's marks, by the inspections' sequence.
 
     Returns:

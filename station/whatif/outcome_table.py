@@ -66,11 +66,7 @@ class Counted:
 
 
 def counted(results: Iterable[Replayed]) -> Counted:
-    """Count results.
-
-    Args:
-        results: in any order.
-    """
+    """Count results."""
     pairs: Counter[tuple[str, str]] = Counter()
     why: Counter[str] = Counter()
     sides: Counter[str] = Counter()

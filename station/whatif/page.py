@@ -69,7 +69,6 @@ def fruit_views(
     """Read the views of some fruit.
 
     Args:
-        connection: of the records.
         folder: the records' folder.
         results: the fruit, in the page's order.
         own: the inspections' own recipe, for its limits; None if they had several.

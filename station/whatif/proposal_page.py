@@ -100,8 +100,6 @@ def page_of(title: str, best: Proposal, figures: dict[str, Any]) -> str:
     """Make the page with its two pictures and a slider on the limit, in one file.
 
     Args:
-        title: the recipe's.
-        best: the proposal.
         figures: its figures, by name.
     """
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)

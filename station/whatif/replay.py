@@ -68,7 +68,6 @@ def replay(stored: StoredPress, own: Recipe | None, draft: Recipe) -> Replayed:
     Args:
         stored: with images if the draft finds contacts differently from `own`.
         own: the recipe of the inspection; None if it is not known any more.
-        draft: the recipe to try.
     """
     if own is None:
         return _undecidable(stored, messages.OLD_RECIPE(), faithful=False)
@@ -94,7 +93,6 @@ def pressed_otherwise(own: Recipe, draft: Recipe) -> Message | None:
 
     Args:
         own: the recipe that the fruit was pressed by.
-        draft: the recipe to try.
     """
     pairs = {
         "gripper": (own.gripper, draft.gripper),
@@ -113,7 +111,6 @@ def measured_otherwise(own: Recipe, draft: Recipe) -> bool:
 
     Args:
         own: the recipe that the areas were measured by.
-        draft: the recipe to try.
     """
     before, after = own.segmentation, draft.segmentation
     if before.method != after.method:
@@ -132,7 +129,6 @@ def _judged(
     Args:
         presses: in order, each as it was measured and as the draft measures it.
         own: the recipe of the inspection.
-        draft: the recipe to try.
         faithful: as in `Replayed`.
     """
     for pressed in range(1, len(presses) + 1):

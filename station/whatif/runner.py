@@ -56,7 +56,6 @@ def batches(folder: Path, wanted: Sequence[int], own: dict[str, str], draft: Rec
         folder: the records' folder.
         wanted: the inspections' sequences, ascending.
         own: the stored recipes, canonical JSON by hash.
-        draft: the recipe to try.
 
     Raises:
         RecordsError: the records cannot be read.

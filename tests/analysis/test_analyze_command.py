@@ -27,9 +27,9 @@ def read_table(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_a_folder_gives_rows_masks_sheet_and_report(press, analyze, tmp_path):
+def test_a_folder_gives_rows_masks_sheet_and_report(press, analyze_apart, tmp_path):
     out = tmp_path / "out"
-    done = analyze("--reference", press.reference, "--method", "paper", "--out", out, press.folder)
+    done = analyze_apart("--reference", press.reference, "--method", "paper", "--out", out, press.folder)
     assert (done.returncode, done.stderr) == (0, "")
     rows = read_table(out / "results.csv")
     assert list(rows[0]) == HEADER
@@ -194,11 +194,11 @@ def spoil_folder(folder: Path) -> Path:
         (spoil_folder, "the folder has no images"),
     ],
 )
-def test_one_bad_image_costs_exit_code_2_and_no_other_result(press, analyze, tmp_path, spoil, words):
+def test_one_bad_image_costs_exit_code_2_and_no_other_result(press, analyze_apart, tmp_path, spoil, words):
     bad = spoil(press.folder)
     first, last = press.folder / "frame_9.png", press.folder / "frame_12.png"
     out = tmp_path / "out"
-    done = analyze("--reference", press.reference, "--method", "paper", "--out", out, first, bad, last)
+    done = analyze_apart("--reference", press.reference, "--method", "paper", "--out", out, first, bad, last)
     assert done.returncode == 2
     assert words in done.stderr
     assert [line for line in done.stderr.splitlines() if not line.startswith("station: ")] == []
@@ -263,7 +263,7 @@ def test_an_output_that_cannot_be_made_is_refused(press, analyze, tmp_path):
         assert file.read_text() == "mine"
 
 
-def test_a_disk_that_fills_up_keeps_what_was_measured(press, analyze, tmp_path):
+def test_a_disk_that_fills_up_keeps_what_was_measured(press, analyze_apart, tmp_path):
     """The limit on a file's size stands for the full disk: the last, noisy stage does not fit any more."""
     out = tmp_path / "out"
     noise = np.random.default_rng(0).integers(0, 255, (320, 240, 3), dtype=np.uint8)
@@ -272,7 +272,7 @@ def test_a_disk_that_fills_up_keeps_what_was_measured(press, analyze, tmp_path):
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
 
-    done = analyze(
+    done = analyze_apart(
         "--reference", press.reference, "--method", "paper", "--stages", "--jobs", 1, "--out", out, press.folder,
         preexec_fn=limit, env=WITHOUT_COVERAGE,
     )  # fmt: skip
@@ -286,13 +286,13 @@ def test_a_disk_that_fills_up_keeps_what_was_measured(press, analyze, tmp_path):
     assert all(cv2.imread(str(picture)) is not None for picture in out.rglob("*.png"))
 
 
-def test_a_mask_that_does_not_fit_the_disk_leaves_no_row(press, analyze, tmp_path):
+def test_a_mask_that_does_not_fit_the_disk_leaves_no_row(press, analyze_apart, tmp_path):
     out = tmp_path / "out"
 
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (400, 400))
 
-    done = analyze(
+    done = analyze_apart(
         "--reference", press.reference, "--method", "paper", "--out", out, press.folder / "frame_9.png",
         preexec_fn=limit, env=WITHOUT_COVERAGE,
     )  # fmt: skip
@@ -317,7 +317,7 @@ def test_on_a_terminal_a_bar_shows_how_far_it_is(press, tmp_path):
     assert b"100%" in shown
 
 
-def test_a_row_is_written_whole_or_not_at_all(press, analyze, tmp_path):
+def test_a_row_is_written_whole_or_not_at_all(press, analyze_apart, tmp_path):
     """The limit falls into the table itself: no half row may stay."""
     for number in range(30):
         shutil.copy(press.folder / "frame_7.png", press.folder / f"{'long_' * 38}{number}.png")
@@ -326,7 +326,7 @@ def test_a_row_is_written_whole_or_not_at_all(press, analyze, tmp_path):
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, 5_000))
 
-    done = analyze(
+    done = analyze_apart(
         "--reference", press.reference, "--method", "paper", "--out", out, press.folder,
         preexec_fn=limit, env=WITHOUT_COVERAGE,
     )  # fmt: skip
@@ -495,8 +495,8 @@ def test_a_video_that_is_cut_short_is_measured_as_far_as_it_goes(press, analyze,
     assert 1 <= len(read_table(out / "results.csv")) < 6
 
 
-def test_the_sites_own_recipes_are_found(press, analyze, tmp_path):
-    done = analyze(
+def test_the_sites_own_recipes_are_found(press, analyze_apart, tmp_path):
+    done = analyze_apart(
         "--reference", press.reference, "--recipe", "cherry", "--out", tmp_path / "out", press.folder,
         env={**os.environ, "STATION_RECIPES_FOLDER": str(tmp_path / "none")},
     )  # fmt: skip

@@ -122,12 +122,13 @@ def test_a_running_station_keeps_its_devices(site):
         os.close(lock)
 
 
-def test_bad_places_and_bad_names_are_bad_usage(site):
-    for arguments in (("--place", "4"), ("--place", "a,b"), ("--place", "40,0"), ("--yes", "--place", "0.5,0")):
-        done = site.station("calibrate", *arguments)
-        assert done.returncode == 2, done.stderr
-        assert "Traceback" not in done.stderr
-    done = site.station("calibrate", "show", "yesterday")
+def test_bad_places_and_bad_names_are_bad_usage(site, station_here):
+    for arguments in (("--place", "4"), ("--place", "a,b"), ("--place", "40,0")):
+        assert station_here("calibrate", *arguments, "--config", site.configuration).returncode == 2
+    done = site.station("calibrate", "--yes", "--place", "0.5,0")
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    done = station_here("calibrate", "show", "yesterday", "--config", site.configuration)
     assert done.returncode == 2
     assert "there is no calibration 'yesterday'" in done.stderr
 

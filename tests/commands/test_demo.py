@@ -71,12 +71,17 @@ def test_every_fruit_is_decided_once_and_the_records_agree(demo, tmp_path):
 
 
 @pytest.mark.timeout(300)
-def test_ctrl_c_ends_everything(demo):
+def test_a_second_one_names_the_process_whose_address_is_in_use_and_ctrl_c_ends_everything(demo):
     process = demo()
     assert process.stdout is not None
     for line in process.stdout:
         if line.startswith("metrics"):
             break
+    second = demo()
+    _, refused = second.communicate(timeout=120)
+    assert second.returncode == 1
+    assert "the process twin ended with exit code 2 before it was ready" in refused
+    assert "is another twin running?" in refused
     children = psutil.Process(process.pid).children(recursive=True)
     assert len(children) >= 3
     process.send_signal(signal.SIGINT)
@@ -91,18 +96,3 @@ def test_a_site_with_real_devices_is_refused(demo):
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 2
     assert errors.startswith("station: the demonstration works with the twin only, but arm.host is 192.0.2.7")
-
-
-def test_an_address_in_use_is_said_with_the_process_that_needs_it(demo, tmp_path):
-    first = demo()
-    assert first.stdout is not None
-    for line in first.stdout:
-        if line.startswith("metrics"):
-            break
-    second = demo()
-    _, errors = second.communicate(timeout=120)
-    first.send_signal(signal.SIGTERM)
-    first.communicate(timeout=120)
-    assert second.returncode == 1
-    assert "the process twin ended with exit code 2 before it was ready" in errors
-    assert "is another twin running?" in errors

@@ -17,15 +17,15 @@ def station(*arguments: object, **options: Any) -> subprocess.CompletedProcess[s
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, **options)
 
 
-def test_faults_and_fruit_from_the_command_line(make_cell):
+def test_faults_and_fruit_from_the_command_line(make_cell, station_here):
     console = ("--console", make_cell("--bench").console)
-    assert "camera: sound" in station("twin", "fault", *console).stdout
-    assert "lens_fogged" in station("twin", "fault", "camera", *console).stdout
-    assert station("twin", "fault", "camera", "dirt", "--amount", 3, *console).stdout == "camera: dirt 3\n"
-    assert "camera: dirt 3" in station("twin", "fault", *console).stdout
-    assert station("twin", "fault", "camera", "dirt", "--clear", *console).stdout == "camera: sound\n"
-    assert "raspberry 4" in station("twin", "lay", "raspberry", "--seed", 4, *console).stdout
-    refused = station("twin", "fault", "camera", "cold", *console)
+    assert "camera: sound" in station_here("twin", "fault", *console).stdout
+    assert "lens_fogged" in station_here("twin", "fault", "camera", *console).stdout
+    assert station_here("twin", "fault", "camera", "dirt", "--amount", 3, *console).stdout == "camera: dirt 3\n"
+    assert "camera: dirt 3" in station_here("twin", "fault", *console).stdout
+    assert station_here("twin", "fault", "camera", "dirt", "--clear", *console).stdout == "camera: sound\n"
+    assert "raspberry 4" in station_here("twin", "lay", "raspberry", "--seed", 4, *console).stdout
+    refused = station_here("twin", "fault", "camera", "cold", *console)
     assert refused.returncode == 2
     assert "it knows: off, stuck" in refused.stderr
 

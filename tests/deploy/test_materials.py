@@ -6,8 +6,6 @@ import json
 import re
 
 import pytest
-from cyclonedx.schema import SchemaVersion
-from cyclonedx.validation.json import JsonStrictValidator
 
 RUNTIME_EXCEPTION = "GPL-3.0-with-GCC-exception"
 """Of GCC's own runtime library, which wheels of numpy and scipy bring: it does not reach what is linked to it."""
@@ -97,6 +95,10 @@ def test_what_is_past_its_end_of_life_is_said_to_be_out_of_reach(bill):
 
 
 def test_the_bill_is_cyclonedx(sbom):
+    # Two seconds of every process that collects this file.
+    from cyclonedx.schema import SchemaVersion  # noqa: PLC0415
+    from cyclonedx.validation.json import JsonStrictValidator  # noqa: PLC0415
+
     assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(sbom.BILL.read_text()) is None
 
 

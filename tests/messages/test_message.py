@@ -20,7 +20,7 @@ from station.messages.message import (
     verbatim,
 )
 
-WIDE = define("test.wide", "{what} is {width_mm} mm wide", what=Name(), width_mm=Number(1))
+WIDE = define("test.wide", "{what} is {width_mm} mm wide", width_mm=Number(1))
 SEVERAL = define_plural("test.several", "{number} fruit", "{number} fruits", "number", number=Number())
 ENCLOSING = define("test.enclosing", "{first}; also {others}.", first=Nested(), others=Listed(" and "))
 
@@ -59,11 +59,18 @@ def test_a_message_of_another_version_with_other_parameters_is_shown_all_the_sam
 def test_an_id_is_defined_once_and_its_braces_are_its_parameters() -> None:
     with pytest.raises(ValueError, match="twice"):
         define("test.wide", "again")
-    with pytest.raises(ValueError, match="the sentence has"):
-        define("test.braces", "{width_mm} and {height_mm}", width_mm=Number())
+    with pytest.raises(ValueError, match=r"the sentence has no \['height_mm'\]"):
+        define("test.braces", "{width_mm}", width_mm=Number(), height_mm=Number())
+    with pytest.raises(ValueError, match=r"differ in \['what'\]"):
+        define_plural("test.forms", "{n} {what}", "{n} fruit", "n", n=Number())
     with pytest.raises(TypeError, match="no number"):
         define_plural("test.plural", "{what}", "{what}s", "what", what=Name())
     assert definition("test.braces") is None
+
+
+def test_a_parameter_whose_kind_is_left_out_is_a_name():
+    with pytest.raises(TypeError, match="what is a name"):
+        WIDE(what=2, width_mm=1)
 
 
 def test_an_error_carries_its_message() -> None:

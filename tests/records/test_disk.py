@@ -209,6 +209,8 @@ def test_a_begin_withdrawn_while_the_records_close_is_withdrawn(opened, scenario
 
     async def steps():
         async with opened(deadline_s=0.2) as records:
+            while not records._opened.images._counted:  # its thread asks the writer, whose end waits for it
+                await asyncio.sleep(0.005)
             with monkeypatch.context() as patch:
                 patch.setattr(HighWaterMark, "save", slowly)
                 with pytest.raises(RecordsDeadlineError, check=because(messages.TOO_SLOW)):

@@ -3,21 +3,22 @@
 import os
 import re
 import subprocess
-import sys
 
 import pytest
 
 
 @pytest.fixture
-def station(tmp_path):
+def station(station_here, tmp_path, monkeypatch):
     """Run the command line in an empty folder."""
+    for name in [name for name in os.environ if name.startswith("STATION_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.chdir(tmp_path)
 
     def run(*arguments: object, **environ: str) -> subprocess.CompletedProcess[str]:
-        clean = {key: value for key, value in os.environ.items() if not key.startswith("STATION_")}
-        return subprocess.run(
-            [sys.executable, "-m", "station", *map(str, arguments)],
-            capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path, env={**clean, **environ},
-        )  # fmt: skip
+        with monkeypatch.context() as given:
+            for name, value in environ.items():
+                given.setenv(name, value)
+            return station_here(*arguments)
 
     return run
 

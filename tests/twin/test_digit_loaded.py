@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from station.twin.digit.codec import as_jpeg, as_video
+from benchmarks.measurement.video import with_video
+from station.twin.digit.codec import as_jpeg
 from station.twin.digit.debris import moved, scattered
 from station.twin.digit.loaded import LoadedLight, band_share
 from station.twin.digit.sensor import Condition, DigitSensor
@@ -107,10 +108,10 @@ def test_jpeg_is_coarser_at_a_lower_quality(sensor):
 def test_a_video_gives_back_as_many_frames(codec, quality):
     noisy = DigitSensor(2)
     frames = [noisy.frame(None, index / 30) for index in range(5)]
-    decoded = as_video(frames, codec, quality)
+    decoded = with_video(frames, codec, quality)
     assert [frame.shape for frame in decoded] == [(*SENSOR_SHAPE, 3)] * 5
     assert 0.5 < np.abs(np.subtract(decoded, frames, dtype=np.float32)).mean() < 6
 
 
 def test_no_frames_give_no_video():
-    assert as_video([]) == []
+    assert with_video([]) == []

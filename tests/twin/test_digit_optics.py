@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
+from benchmarks.twin.fit import Press, ball_dent, fit_table, free_of_contact, main, read_presses
+from benchmarks.twin.statistics import measure_noise
 from station.twin.digit.backgrounds import background
-from station.twin.digit.fit import Press, ball_dent, fit_table, free_of_contact, main, read_presses
 from station.twin.digit.numbers import Fitted
 from station.twin.digit.optics import SLOPE_KNOTS, Optics, slope_basis
 from station.twin.digit.press import PressOptions, render_press
 from station.twin.digit.sensor import Condition, DigitSensor
-from station.twin.digit.statistics import measure_noise
 from station.twin.fruit import Kind, draw_fruit
 from station.twin.gel import GRID_MM, GRID_SHAPE, SENSOR_SHAPE, Gel
 

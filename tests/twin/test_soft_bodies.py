@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 
+from benchmarks.measurement.soft.body import Foundation, SoftBody, SoftKind, draw_soft_body
+from benchmarks.measurement.soft.contact import SoftOnGel
+from benchmarks.measurement.soft.skin import Skin, relief
 from benchmarks.measurement.soft_bodies import (
     FILLING,
     KINDS,
@@ -16,9 +19,6 @@ from benchmarks.measurement.soft_bodies import (
 )
 from station.twin.contact import Pose
 from station.twin.gel import GRID_SHAPE, SENSOR_SHAPE
-from station.twin.soft.body import Foundation, SoftBody, SoftKind, draw_soft_body
-from station.twin.soft.contact import SoftOnGel
-from station.twin.soft.skin import Skin, relief
 
 FIELD_PX = SENSOR_SHAPE[0] * SENSOR_SHAPE[1]
 BALL = SoftBody(SoftKind.SOFT_BALL, 0, (20.0, 20.0), Foundation(0.03, 0.1, 0.1))

@@ -5,12 +5,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from benchmarks.measurement.soft.body import Foundation, SoftBody, SoftKind
+from benchmarks.measurement.soft.contact import SoftOnGel
 from station.settings.segmentation import RobustParameters
 from station.twin.contact import Pose
 from station.twin.digit.loaded import band_share
 from station.twin.digit.sensor import Condition, DigitSensor
-from station.twin.soft.body import Foundation, SoftBody, SoftKind
-from station.twin.soft.contact import SoftOnGel
 from station.vision.press import PressTracker
 from station.vision.robust import RobustMethod
 from station.vocabulary import Flag

@@ -9,6 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from benchmarks.measurement.soft.body import Foundation, SoftBody, SoftKind
+from benchmarks.measurement.soft.contact import SoftOnGel
 from station.settings.segmentation import RobustParameters
 from station.studies.cohort import member
 from station.twin.contact import FruitOnGel, Pose
@@ -17,8 +19,6 @@ from station.twin.digit.press import PressOptions, render_press
 from station.twin.digit.sensor import Condition, DigitSensor
 from station.twin.fruit import draw_fruit
 from station.twin.gel import MM_PER_PX, Gel
-from station.twin.soft.body import Foundation, SoftBody, SoftKind
-from station.twin.soft.contact import SoftOnGel
 from station.twin.squeeze import Squeeze
 from station.vision.constants import CONSTANTS
 from station.vision.robust import STAGES, RobustMethod

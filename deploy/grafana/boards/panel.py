@@ -78,11 +78,6 @@ def prom(
     """Make a panel with Prometheus queries.
 
     Args:
-        kind: as in `Panel`, likewise the following.
-        title: see there.
-        unit: see there.
-        about: see there.
-        link: see there.
         queries: expressions, alone or with their legend.
         more: other fields of `Panel`.
     """
@@ -94,11 +89,6 @@ def sql(kind: str, title: str, unit: str, about: str, link: str, ask: str, **mor
     """Make a panel with a PostgreSQL query.
 
     Args:
-        kind: as in `Panel`, likewise the following.
-        title: see there.
-        unit: see there.
-        about: see there.
-        link: see there.
         ask: the statement; the first column of a time series is `time`.
         more: other fields of `Panel`.
     """
@@ -134,7 +124,6 @@ def built(panel: Panel, number: int) -> Any:
     """Return the panel for Grafana.
 
     Args:
-        panel: the definition.
         number: unique on the dashboard.
     """
     making = _MAKERS[panel.kind](panel)
@@ -154,7 +143,6 @@ def board(uid: str, title: str, about: str, variables: tuple[Any, ...], rows: di
 
     Args:
         uid: permanent identity for links and bookmarks.
-        title: its name.
         about: the question that it answers.
         variables: the reader's selections.
         rows: panels under their headings.

@@ -40,8 +40,6 @@ def described_emergency(node: Message, code: int, register: int) -> Message:
     """Describe an emergency, with the remedy.
 
     Args:
-        node: its name.
-        code: the emergency error code.
         register: the error register, object 0x1001.
     """
     what, remedy = _NAMES.get(code, (_CLASSES.get(code & 0xF000, messages.UNKNOWN), messages.DO_MANUAL))

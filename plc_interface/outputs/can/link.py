@@ -119,7 +119,6 @@ class CanLink:
         """Open the bus and listen.
 
         Args:
-            settings: the bus and the node ids.
             counters: receptions are counted here, by the receiving thread alone.
             on_report: called by the receiving thread.
             on_emergency: called by the receiving thread.

@@ -37,7 +37,6 @@ def diagnose(snapshot: Snapshot, facts: DashboardFacts, output: Message | None, 
     """Return the cause why a command was not done or no program plays.
 
     Args:
-        snapshot: the controller's state.
         facts: of its dashboard server.
         output: of the failed command; None if it gave none.
         was_healthy: the station's health lease was renewed without a gap.

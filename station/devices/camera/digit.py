@@ -83,9 +83,6 @@ def _text(path: Path) -> str:
 def packed_leds(leds: Leds) -> int:
     """Return the zoom control's value for a light: red in bits 8 to 11, green in 4 to 7, blue in 0 to 3.
 
-    Args:
-        leds: brightness of each colour.
-
     Raises:
         ValueError: a brightness is not from 0 to 15.
     """
@@ -197,10 +194,6 @@ class DigitCamera:
     async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
         """See `Camera.frame`.
 
-        Args:
-            newer_than_s: monotonic time that the capture must come after.
-            deadline_s: longest wait, in seconds.
-
         Raises:
             NoFrameError: no such frame came in time.
         """
@@ -208,9 +201,6 @@ class DigitCamera:
 
     async def set_leds(self, leds: Leds) -> None:
         """Set the light as soon as the frame under way is read, which still has the old one. Idempotent.
-
-        Args:
-            leds: brightness of each colour.
 
         Raises:
             ValueError: a brightness is not from 0 to 15.

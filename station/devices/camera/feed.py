@@ -14,7 +14,6 @@ class FrameFeed:
 
     Args:
         name: the camera's, for messages.
-        health: checks the frames.
         remedy: for the message if no frame comes; None for cable and light.
     """
 
@@ -52,7 +51,6 @@ class FrameFeed:
 
         Args:
             newer_than_s: monotonic time.
-            deadline_s: longest wait, in seconds.
 
         Raises:
             NoFrameError: none came in time.

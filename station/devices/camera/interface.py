@@ -139,9 +139,6 @@ class Camera(Protocol):
     async def set_leds(self, leds: Leds) -> None:
         """Set the light. Idempotent; a camera without settable light does nothing.
 
-        Args:
-            leds: brightness of each colour.
-
         Raises:
             CameraError: the camera does not answer.
         """

@@ -68,7 +68,6 @@ class ReplayCamera:
 
         Args:
             newer_than_s: monotonic time that the capture must come after; ignored without a rate.
-            deadline_s: longest wait, in seconds.
 
         Raises:
             NoFrameError: no such frame came in time, or the recording has ended.

@@ -80,10 +80,6 @@ class TwinCamera:
     async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
         """See `Camera.frame`.
 
-        Args:
-            newer_than_s: monotonic time that the capture must come after.
-            deadline_s: longest wait, in seconds.
-
         Raises:
             NoFrameError: no such frame came in time.
         """
@@ -91,9 +87,6 @@ class TwinCamera:
 
     async def set_leds(self, leds: Leds) -> None:
         """Set the light. Idempotent.
-
-        Args:
-            leds: brightness of each colour.
 
         Raises:
             CameraError: the twin does not answer, or refuses.

@@ -22,7 +22,6 @@ def width_of_count(count: int, calibration: GripperCalibration) -> float:
 
     Args:
         count: position as read, 0 to 255.
-        calibration: the finger set.
     """
     opening_mm = (calibration.closed_count - count) * calibration.mm_per_count
     return opening_mm - calibration.finger_offset_mm
@@ -38,7 +37,6 @@ def count_for_width(width_mm: float, calibration: GripperCalibration) -> int:
 
     Args:
         width_mm: 0 to the widest gap of the finger set.
-        calibration: the finger set.
 
     Raises:
         GripperRequestError: the width is out of reach.

@@ -112,11 +112,7 @@ class Robotiq2F85:
                 await self._wait_until(deadline_s, at_s, messages.STEP_ACTIVATION(), status)
 
     async def open(self, width_mm: float | None = None) -> MoveResult:
-        """Open fast: fully, or to a width. Idempotent. Raises as `move_to_width`.
-
-        Args:
-            width_mm: gap between the finger surfaces; None for `max_width_mm`.
-        """
+        """Open fast: fully, or to a width. Idempotent. Raises as `move_to_width`."""
         to_mm = self.max_width_mm if width_mm is None else width_mm
         return await self.move_to_width(to_mm, self._settings.opening_speed_mm_s, WEAKEST_N)
 

@@ -104,11 +104,7 @@ class AlarmManager:
         return self._alarms
 
     def raise_(self, alarm: AlarmId, detail: Message | None) -> None:
-        """Raise an alarm; it is published once for as long as its cause is present.
-
-        Args:
-            detail: the finding.
-        """
+        """Raise an alarm; it is published once for as long as its cause is present."""
         if alarm not in self._present:
             self._present.add(alarm)
             self._set(self._alarms.raise_(alarm, time.time(), detail), alarm, "raised", detail)
@@ -159,7 +155,6 @@ class AlarmManager:
         Args:
             alarm: a latched alarm, and one that is shelved already, does not change.
             for_s: at most `LONGEST_SHELVED_S`.
-            by: the person's name.
 
         Returns:
             Whether that changed anything.

@@ -393,7 +393,6 @@ class Inspector:
         """End an inspection that cannot be judged, with what was measured so far.
 
         Args:
-            now: the inspection.
             because: the event that ended it.
             why: for a person.
         """

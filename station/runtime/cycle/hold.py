@@ -19,7 +19,6 @@ class Hold:
     """The event that the next start begins with, in a file. A file that cannot be read counts as a held fruit.
 
     Args:
-        state_files: contain it.
         carries: the arm carries judged fruit to their places.
     """
 

@@ -24,7 +24,6 @@ class Pacing:
     """The deadlines of one cell.
 
     Args:
-        configuration: the site's.
         cell: the devices; a camera tells its rate once it is open.
     """
 
@@ -33,9 +32,6 @@ class Pacing:
 
     def expected(self, recipe: Recipe) -> Deadlines:
         """The deadlines of a recipe's inspection on a machine that has nothing else to do.
-
-        Args:
-            recipe: the recipe.
 
         Raises:
             BadInputError: an inspection would take longer than the PLC can be told.
@@ -81,13 +77,7 @@ class Pacing:
 
 
 def late_now(now: Inspection, state: State, in_state_s: float) -> Late | None:
-    """What of an accepted inspection is late.
-
-    Args:
-        now: the inspection.
-        state: the cycle's.
-        in_state_s: for how long.
-    """
+    """What of an accepted inspection is late."""
     if now.accepted_s is None:
         return None
     since_s = None if now.standing is not None else time.monotonic() - now.accepted_s
@@ -95,11 +85,7 @@ def late_now(now: Inspection, state: State, in_state_s: float) -> Late | None:
 
 
 def longest_move_s(arm: ArmSettings) -> float:
-    """The longest way between two of the arm's places.
-
-    Args:
-        arm: poses, speed and acceleration.
-    """
+    """The longest way between two of the arm's places."""
     return max(way_s(arm, *pair) for pair in combinations(POSES, 2))
 
 
@@ -107,7 +93,6 @@ def way_s(arm: ArmSettings, *poses: PoseName) -> float:
     """The time of a way over the arm's places, with a stop at each: its leading joint speeds up, travels and brakes.
 
     Args:
-        arm: poses, speed and acceleration.
         poses: at least two.
     """
     places = [arm.poses.joints_rad(pose) for pose in poses]

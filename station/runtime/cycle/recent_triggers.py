@@ -46,11 +46,7 @@ class RecentTriggers:
             self._inspections.pop(forgotten, None)
 
     def ended(self, outcome: Outcome) -> None:
-        """Pass an outcome to the callers that wait for it now or later; a second one is ignored.
-
-        Args:
-            outcome: as stored.
-        """
+        """Pass an outcome to the callers that wait for it now or later; a second one is ignored."""
         waiting = self._outcomes.get(outcome.sequence)
         if waiting is not None and not waiting.done():
             waiting.set_result(outcome)
@@ -95,11 +91,7 @@ class PendingTrigger:
         return self._answer.done()
 
     def answer(self, begun: BeginReply) -> None:
-        """Answer the request; a second answer is ignored.
-
-        Args:
-            begun: accepted or refused.
-        """
+        """Answer the request; a second answer is ignored."""
         if not self.is_answered:
             self._answer.set_result(begun)
 

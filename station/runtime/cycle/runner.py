@@ -31,11 +31,7 @@ _STOPS = {
 
 
 def event_of(fault: BaseException) -> Event:
-    """The cycle's event for what an action or a watch ran into.
-
-    Args:
-        fault: as raised.
-    """
+    """The cycle's event for what an action or a watch ran into."""
     match fault:
         case ArmFault():
             return _STOPS.get(fault.cause, Event.ARM_FAULT)
@@ -94,7 +90,6 @@ class Performer(Protocol):
         """Raise an alarm.
 
         Args:
-            told: which.
             why: what was seen.
         """
         ...
@@ -103,8 +98,6 @@ class Performer(Protocol):
         """The state has changed.
 
         Args:
-            state: the new one.
-            after: the one before.
             took_s: how long that was held.
         """
         ...
@@ -153,7 +146,6 @@ class CycleRunner:
         """Report an event from outside of the actions.
 
         Args:
-            event: what.
             why: for a person.
         """
         self._events.put_nowait(Happened(event, why, None))
@@ -175,11 +167,7 @@ class CycleRunner:
             await self._forget()
 
     async def until(self, wanted: Callable[[State], bool]) -> State:
-        """Wait for a state.
-
-        Args:
-            wanted: says which.
-        """
+        """Wait for a state."""
         while not wanted(self.state):
             self._changed.clear()
             await self._changed.wait()

@@ -169,7 +169,6 @@ class Service:
         """Begin an inspection, or refuse it. The same request again, before its outcome was published, begins none.
 
         Args:
-            request: the trigger.
             refusal: why none may begin now.
             lot: of the fruit.
         """

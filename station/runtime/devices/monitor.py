@@ -31,7 +31,6 @@ class DeviceMonitor:
     Args:
         name: of the device, as in the log.
         title: its name as a person reads it.
-        check: checks the device.
         longest_pause_s: between two checks.
         on_change: gets the fault from now on, None for no fault.
         on_progress: called after each check, whatever its result.

@@ -25,7 +25,6 @@ class GoldenReference:
     the gel or its cleaning, a person removes the file and the next reference replaces it.
 
     Args:
-        state_files: state files of the home folder.
         calibrated: returns the calibration's file; None if there is none.
     """
 

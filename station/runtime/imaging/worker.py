@@ -33,7 +33,6 @@ class VisionWorker:
 
     Args:
         golden: reference that every new one is compared with.
-        settings: limits for a good reference.
     """
 
     def __init__(self, golden: GoldenReference, settings: ReferenceSettings) -> None:
@@ -57,7 +56,6 @@ class VisionWorker:
 
         Args:
             frames: of one shape.
-            segmentation: of the recipe.
 
         Returns:
             The reference, shape (height, width, 3), dtype uint8, BGR, and its properties.

@@ -34,11 +34,7 @@ class AuditLogger:
         self._writing = asyncio.Lock()
 
     def log(self, *entries: AuditEntry) -> None:
-        """Queue entries to be written.
-
-        Args:
-            entries: in their order.
-        """
+        """Queue entries to be written."""
         self._waiting += entries
         if len(self._waiting) > MOST_WAITING:
             log.error("the audit trail loses its oldest unwritten row: %s", self._waiting.pop(0))
@@ -51,8 +47,6 @@ class AuditLogger:
 
         Args:
             who: `plc`, `panel` or a person's name.
-            command: name of the command.
-            subject: object of the command.
             why_not: reason of the refusal; None if it was carried out.
             role: of `who`; by default the same as `who`.
             **old: values before the command, where they matter.
@@ -93,7 +87,6 @@ def command_entry(command: Command, done: CommandDone, old: Any, by: tuple[str, 
     """Make the entry of a command that the PLC or a person gave.
 
     Args:
-        done: its result.
         old: the value before; None if unknown.
         by: name and role of who gave it.
     """
@@ -105,7 +98,6 @@ def calibration_entry(who: str, reason: str, subject: str, old: Any, new: Any) -
     """Make the entry of a calibration; for `Records.audit`, or `append_audit` if no station runs.
 
     Args:
-        who: the person who made it.
         reason: as `yearly`, `gel changed`.
         subject: the calibrated thing, as `scale of DIGIT D20966`.
         old: value in force before, None for none.
@@ -118,10 +110,8 @@ def verification_entry(who: str, subject: str, calibration: str, verification: s
     """Make the entry of a verification.
 
     Args:
-        who: the person who made it.
         subject: the verified thing, as `sensor D20966`.
         calibration: id of the calibration compared with.
-        verification: its own id.
         passed: all values were within their tolerances.
     """
     new = {"calibration": calibration, "verification": verification, "passed": passed}
@@ -133,9 +123,7 @@ def alarm_entry(who: str, role: str, change: str, alarm: str, reason: str = "") 
 
     Args:
         who: `plc`, `panel` or a person's name.
-        role: of `who`.
         change: `acknowledged`, `shelved`, `unshelved` or `reset`.
-        alarm: its id.
         reason: as for shelving.
     """
     return AuditEntry(who, role, f"alarm.{change}", f"alarm {alarm}", reason)

@@ -4,13 +4,14 @@ import asyncio
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
+from station.channel.panel_maintenance_queries import PartHealth
 from station.messages.message import Message
 from station.runtime.observability.metrics import Metrics
 from station.serving.guard import GuardedListener, Limits
@@ -22,27 +23,13 @@ LIMITS = Limits(most=64, per_address=32, reserve=32)
 
 
 @dataclass(frozen=True, slots=True)
-class Dependency:
-    """One thing that an inspection needs."""
-
-    name: str
-    state: Literal["ok", "degraded", "fault", "unknown"]
-    """`degraded` still inspects."""
-    age_s: float | None
-    """Since its last sign of life; None if there was none."""
-    detail: Message | None = None
-    remedy: Message | None = None
-    """None only if ok."""
-
-
-@dataclass(frozen=True, slots=True)
 class Readiness:
     """Readiness for a trigger, with the reason if not ready."""
 
     ready: bool
     why: Message | None
     """With the remedy; None if ready."""
-    dependencies: tuple[Dependency, ...]
+    dependencies: tuple[PartHealth, ...]
 
 
 class Liveness:
@@ -95,10 +82,7 @@ class HealthServer:
         Args:
             host: address or host name.
             port: TCP; 0 takes a free one.
-            metrics: for /metrics.
-            liveness: for /livez.
             readiness: called at each /readyz; must not block.
-            version: for /version.
         """
         self._host = host
         self._port = port

@@ -18,8 +18,6 @@ def log_fruit(
     """Log one fruit in one line: sequence, fruit, curve as a sparkline, outcome, time, explanation.
 
     Args:
-        log: of the caller.
-        outcome: as published to the PLC.
         fruit: the recipe's name.
         areas_mm2: the curve, step by step.
     """

@@ -38,7 +38,6 @@ class Metrics:
         """Register everything in the table.
 
         Args:
-            version: the program's.
             deadline_s: of one inspection; centre of the durations' buckets.
             clock: monotonic, s.
         """
@@ -76,8 +75,6 @@ class Metrics:
 
         Args:
             fruit: the recipe's name, empty for none.
-            outcome: as given to the PLC.
-            phases_s: duration of each phase.
             deadline_s: of this inspection, where it is still known.
         """
         fruit = fruit or "none"

@@ -23,10 +23,7 @@ def start_entries(
     """Make the entries of a start, with the settings that changed since the previous start.
 
     Args:
-        boot: name of this start.
-        configuration: in force.
         state_files: stores the configuration of the last start.
-        versions: of the programs.
         broken: error of the configuration's file; its last good form is in force then.
     """
     key = state_files.read(_KEY)
@@ -50,7 +47,6 @@ def end_entry(boot: str, *, requested: bool) -> AuditEntry:
     """Make the entry of an end.
 
     Args:
-        boot: name of the start.
         requested: the end was requested, and is not caused by a failure.
     """
     return AuditEntry(STATION, STATION, "service.ended", "station", "", None, {"boot": boot, "asked": requested})

@@ -19,7 +19,6 @@ class LotManager:
 
     Args:
         service: inspects by the frozen recipe.
-        recipes: the recipes in force.
     """
 
     def __init__(self, service: Service, recipes: ActiveRecipes, audit: AuditLogger) -> None:

@@ -1,12 +1,13 @@
 """Readiness for a trigger, or the reason against it: one sentence with the remedy."""
 
 from station.channel.line import StationState
+from station.channel.panel_maintenance_queries import PartHealth
 from station.inspection.states import STATES, State
 from station.messages import readiness as messages
 from station.messages.message import Message, joined, message_of
 from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import DeviceManager
-from station.runtime.observability.health import Dependency, Readiness
+from station.runtime.observability.health import Readiness
 from station.runtime.observability.observability import Observability
 from station.runtime.production.lots import LotManager
 from station.runtime.production.plc_commands import PlcCommands
@@ -100,36 +101,31 @@ class Interlock:
         """Return the same for supervisors, with every dependency's age."""
         refusal, why = self.refusal()
         devices = [
-            Dependency(
-                name,
-                "ok" if watch.fault is None else "fault" if watch.heard_s is not None else "unknown",
-                watch.age_s,
-                None if watch.fault is None else message_of(watch.fault),
-                None if watch.fault is None else messages.SEE_DEVICES(),
+            PartHealth(
+                name=name,
+                state="ok" if watch.fault is None else "fault" if watch.heard_s is not None else "unknown",
+                age_s=watch.age_s,
+                detail=None if watch.fault is None else message_of(watch.fault),
+                remedy=None if watch.fault is None else messages.SEE_DEVICES(),
             )
             for name, watch in self._devices.monitors.items()
         ]
         return Readiness(refusal is None, why, (*devices, self._records(), self._line()))
 
-    def _records(self) -> Dependency:
-        fault, status = self._service.registry.fault, self._service.registry.records.status()
+    def _records(self) -> PartHealth:
+        fault, age_s = self._service.registry.fault, self._service.registry.records.status().last_write_age_s
         if fault is None:
-            return Dependency("records", "ok", status.last_write_age_s)
-        return Dependency("records", "fault", status.last_write_age_s, fault.cause, fault.remedy)
+            return PartHealth(name="records", state="ok", age_s=age_s)
+        return PartHealth(name="records", state="fault", age_s=age_s, detail=fault.cause, remedy=fault.remedy)
 
-    def _line(self) -> Dependency:
+    def _line(self) -> PartHealth:
         age_s = self._plc_commands.line_age_s
         if age_s is None:
-            return Dependency(
-                "plc",
-                "unknown",
-                None,
-                messages.PLC_NOT_HEARD(),
-                messages.START_PLC(),
-            )
+            why, remedy = messages.PLC_NOT_HEARD(), messages.START_PLC()
+            return PartHealth(name="plc", state="unknown", age_s=None, detail=why, remedy=remedy)
         if trouble := self._plc_commands.line_fault():
-            return Dependency("plc", "fault", age_s, trouble, messages.SEE_DETAIL())
-        return Dependency("plc", "ok", age_s)
+            return PartHealth(name="plc", state="fault", age_s=age_s, detail=trouble, remedy=messages.SEE_DETAIL())
+        return PartHealth(name="plc", state="ok", age_s=age_s)
 
     def _trouble(self) -> Message | None:
         if self._service.state not in _DEVICES_DECIDE:

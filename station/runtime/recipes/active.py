@@ -40,12 +40,7 @@ class ActiveRecipe:
 
     @classmethod
     def of(cls, recipe: Recipe, revision: str = "") -> "ActiveRecipe":
-        """Freeze a recipe.
-
-        Args:
-            recipe: as read.
-            revision: the revision in force.
-        """
+        """Freeze a recipe."""
         return cls(recipe, RecipeSnapshot.of(recipe.model_dump(mode="json"), revision))
 
 

@@ -8,12 +8,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
 
-from station.calibration.calibration_procedure import CalibrationProcedure, Draft
+from station.calibration.calibration_procedure import CalibrationProcedure
 from station.calibration.checks import check_name, failed_check
 from station.calibration.model import Calibration, Verification
+from station.calibration.report import calibration_files, verification_files
 from station.calibration.rig import Place, Progress, Unit
 from station.calibration.store import CalibrationStore
-from station.calibration.verification_procedure import VerificationProcedure, VerificationResult
+from station.calibration.verification_procedure import VerificationProcedure
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (
@@ -118,7 +119,7 @@ class PanelCalibration:
         return CalibrationState(
             serial=serial,
             in_use=self._devices.calibration.in_force.words,
-            calibration=None if calibration is None else self._calibration_view(calibration),
+            calibration=None if calibration is None else self._view(calibration, calibration.summary(), passed=True),
             verification=None if verification is None else self._verification_view(verification),
             age_s=figures.age_s,
             verification_age_s=figures.verification_age_s,
@@ -203,7 +204,7 @@ class PanelCalibration:
             lambda progress: _note_step(run, progress),
         ).run()
         before, new = self._store.current(draft.calibration.serial), draft.calibration
-        files = await asyncio.to_thread(_calibration_files, draft)
+        files = await asyncio.to_thread(calibration_files, draft)
         entry = calibration_entry(
             run.actor.who, "", f"sensor {new.serial}", None if before is None else before.id, new.id
         )
@@ -230,7 +231,7 @@ class PanelCalibration:
             run.actor.who,
             lambda progress: _note_step(run, progress),
         ).run()
-        files = await asyncio.to_thread(_verification_files, verified, calibration)
+        files = await asyncio.to_thread(verification_files, verified, calibration)
         made = verified.verification
         entry = verification_entry(
             run.actor.who, f"sensor {calibration.serial}", calibration.id, made.id, passed=made.passed
@@ -260,28 +261,18 @@ class PanelCalibration:
         kind = self._run.kind if self._run is not None else "run"
         self._audit.log(AuditEntry(actor.who, actor.role, f"calibration.{what}", kind))
 
-    def _calibration_view(self, made: Calibration) -> CalibrationView:
-        return CalibrationView(
-            serial=made.serial,
-            id=made.id,
-            made_utc_ms=round(1000 * made.made_at.timestamp()),
-            operator=made.operator,
-            words=made.summary(),
-            passed=True,
-            checks=_check_views(made),
-            folder=str(self._store.folder(made).absolute()),
-            pictures=_files_in(self._store.folder(made)),
-        )
-
     def _verification_view(self, made: Verification) -> CalibrationView:
         ratio = None if made.area_ratio is None else messages.RATIO_OF_BALL(percent=100 * made.area_ratio)
+        return self._view(made, ratio, passed=made.passed)
+
+    def _view(self, made: Calibration | Verification, words: Message | None, *, passed: bool) -> CalibrationView:
         return CalibrationView(
             serial=made.serial,
             id=made.id,
             made_utc_ms=round(1000 * made.made_at.timestamp()),
             operator=made.operator,
-            words=ratio,
-            passed=made.passed,
+            words=words,
+            passed=passed,
             checks=_check_views(made),
             folder=str(self._store.folder(made).absolute()),
             pictures=_files_in(self._store.folder(made)),
@@ -289,9 +280,7 @@ class PanelCalibration:
 
 
 def _note_step(run: _Run, progress: Progress) -> None:
-    run.steps[progress.title.id] = RunStep(
-        number=progress.number, of=progress.of, title=progress.title, detail=progress.detail
-    )
+    run.steps[progress.title.id] = RunStep(**progress._asdict())
 
 
 def _run_view(run: _Run) -> CalibrationRunView:
@@ -317,16 +306,3 @@ def _files_in(folder: Path) -> tuple[str, ...]:
     with contextlib.suppress(OSError):
         return tuple(name for name in _PICTURES if (folder / name).is_file())
     return ()
-
-
-# The plots' library is a third of what this process would load at its start, for pages that are made once a shift.
-def _calibration_files(draft: Draft) -> dict[str, bytes]:
-    from station.calibration.report import calibration_files  # noqa: PLC0415
-
-    return calibration_files(draft)
-
-
-def _verification_files(verified: VerificationResult, calibration: Calibration) -> dict[str, bytes]:
-    from station.calibration.report import verification_files  # noqa: PLC0415
-
-    return verification_files(verified, calibration)

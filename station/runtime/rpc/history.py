@@ -27,13 +27,13 @@ class PanelHistory:
         """Store a lot's start with its audit entry."""
         lot = await self._records.change(lambda connection: start_lot(connection, request.name, request.grower))
         await self._note(request, "lot.told", {"grower": lot.grower})
-        return LotView(**lot._asdict())
+        return lot
 
     async def end_lot(self, request: EndLot) -> LotView:
         """Store a lot's end with its audit entry."""
         lot = await self._records.change(lambda connection: end_lot(connection, request.name))
         await self._note(request, "lot.ended", {"ended_utc_ms": lot.ended_utc_ms})
-        return LotView(**lot._asdict())
+        return lot
 
     async def note_export(self, request: NoteExport) -> Noted:
         """Store the audit entry of an export."""

@@ -38,7 +38,6 @@ class LogRing(logging.Handler):
         """Return the newest lines, newest last.
 
         Args:
-            number: at most so many lines.
             level: name of the lowest level.
         """
         least = logging.getLevelNamesMapping()[level]

@@ -20,7 +20,6 @@ from station.channel.panel_maintenance_queries import (
     LedsSet,
     LiveImage,
     Log,
-    PartHealth,
     ReadLog,
     Registers,
     SetLeds,
@@ -131,10 +130,7 @@ class PanelMaintenance:
             state=STATES[self._service.state].activity,
             jog_refused=self.refusal(),
             width_mm=self._devices.width_mm(),
-            parts=tuple(
-                PartHealth(name=each.name, state=each.state, age_s=each.age_s, detail=each.detail, remedy=each.remedy)
-                for each in readiness.dependencies
-            ),
+            parts=readiness.dependencies,
             devices=self._devices.names,
             versions=self._versions,
             records={

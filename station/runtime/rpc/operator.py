@@ -14,7 +14,6 @@ from station.channel.panel_live import (
     GetRecent,
     GetRecipes,
     OperatorCommand,
-    OperatorCommandView,
     PanelState,
     PersonNoted,
     Picture,
@@ -52,7 +51,6 @@ class PanelServer:
     """Channel server for the HMI.
 
     Args:
-        configuration: in force.
         production: what is shown and commanded.
         records: gets lots.
         alarms: alarm commands of people.
@@ -86,7 +84,7 @@ class PanelServer:
             GetFruit: self._fruit,
             GetPicture: self._picture,
             GetRecipes: self._recipes,
-            OperatorCommand: self._order,
+            OperatorCommand: self._operator_commands.start,
             PersonNoted: self._person,
             **alarms.handlers,
         }
@@ -172,9 +170,6 @@ class PanelServer:
             active=None if active is None else _recipe_view(active),
             problems=self._book.problems,
         )
-
-    async def _order(self, request: OperatorCommand) -> OperatorCommandView:
-        return await self._operator_commands.start(request)
 
     async def _person(self, request: PersonNoted) -> Noted:
         person, action = request.person, f"panel.{request.what}"

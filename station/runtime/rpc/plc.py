@@ -6,7 +6,6 @@ from station.channel.line import (
     Begin,
     BeginReply,
     Command,
-    CommandDone,
     Line,
     Noted,
     Open,
@@ -48,8 +47,8 @@ class PlcInterfaceServer:
                 Acknowledged: self._acknowledged,
                 Resume: self._resume,
                 Line: self._line,
-                Command: self._command,
-                Recover: self._recover,
+                Command: production.plc_commands.execute,
+                Recover: production.plc_commands.recover,
                 **alarms.handlers,
             },
         )
@@ -82,9 +81,3 @@ class PlcInterfaceServer:
     async def _line(self, request: Line) -> StationState:
         self._plc_commands.set_line(request)
         return self._interlock.state()
-
-    async def _recover(self, request: Recover) -> CommandDone:
-        return await self._plc_commands.recover(request)
-
-    async def _command(self, request: Command) -> CommandDone:
-        return await self._plc_commands.execute(request)

@@ -116,11 +116,7 @@ class RecentInspections:
         return Counts(passed=counted["PASS"], failed=counted["FAIL"], unjudged=counted["NO_RESULT"])
 
     def recent(self, most: int) -> tuple[FruitSummary, ...]:
-        """Return the last fruit, newest first.
-
-        Args:
-            most: at most so many.
-        """
+        """Return the last fruit, newest first."""
         return tuple(reversed(self._short))[:most]
 
     def fruit(self, sequence: int) -> Fruit:
@@ -158,9 +154,7 @@ def fruit_view(
     """Make the page's view of a fruit.
 
     Args:
-        published: as published to the PLC.
         record: the station's own result.
-        deadline_s: longest duration of the inspection.
         picture: step that has a picture.
     """
     onset_mm = record.measures.get("onset_mm")
@@ -199,7 +193,6 @@ def short_view(published: Outcome, recipe: str, areas_mm2: Iterable[float | None
     """Make the view of a fruit in a list.
 
     Args:
-        published: as published to the PLC.
         recipe: the recipe's name.
         areas_mm2: of the steps since the contact onset.
     """

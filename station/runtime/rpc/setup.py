@@ -12,12 +12,7 @@ PLC = "plc"
 
 
 def setup_view(configuration: Configuration, devices: DeviceManager) -> SetupView:
-    """Return the facts now.
-
-    Args:
-        configuration: in force.
-        devices: the station's.
-    """
+    """Return the facts now."""
     calibration, golden = devices.calibration.calibration, devices.calibration.golden()
     modbus, arm, joints_rad = configuration.modbus, configuration.arm, devices.joints_rad
     addresses = {

@@ -19,8 +19,6 @@ class LineEncoder(TwinNode):
         """Make the encoder.
 
         Args:
-            settings: the bus and the node ids.
-            clock: the twin's time.
             faults: the line's board.
             first_count: what it counts from.
         """

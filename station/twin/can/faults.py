@@ -51,7 +51,6 @@ def gone(faults: FaultBoard, clock: Clock, own: LineFault) -> bool:
     """Whether a node is silent now.
 
     Args:
-        faults: the line's board.
         clock: the time by which `intermittent` comes and goes.
         own: the node's own fault of that kind.
     """

@@ -41,8 +41,6 @@ class RejectGate(TwinNode):
         """Make the gate.
 
         Args:
-            settings: the bus and the node ids.
-            clock: the twin's time.
             faults: the line's board.
         """
         network = LoopNetwork(settings, lambda: gone(faults, clock, LineFault.GATE_SILENT))

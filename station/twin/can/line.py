@@ -24,8 +24,6 @@ class LineNodes:
         """Make the nodes; nothing is opened before `start`.
 
         Args:
-            settings: the bus and the node ids.
-            clock: the twin's time.
             faults: the switches, from `line_faults`.
             first_count: what the encoder counts from.
         """

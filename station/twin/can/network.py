@@ -40,7 +40,6 @@ class LoopNetwork(canopen.Network):
         """Prepare; nothing is opened.
 
         Args:
-            settings: the bus.
             silent: whether nothing is sent or heard now.
         """
         super().__init__()

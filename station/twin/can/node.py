@@ -57,7 +57,6 @@ class TwinNode:
         """Send an emergency once, and remember it in objects 1001 and 1003.
 
         Args:
-            code: the emergency error code.
             register: the error register's bits that go with it.
         """
         if code in self._errors:

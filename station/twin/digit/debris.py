@@ -29,7 +29,6 @@ def scattered(count: int, generator: np.random.Generator) -> list[Speck]:
     """Specks of 0.5 to 1.5 mm anywhere on the gel.
 
     Args:
-        count: how many.
         generator: draws four numbers for each.
     """
     rows, columns = GRID_SHAPE
@@ -50,7 +49,6 @@ def moved(specks: list[Speck], generator: np.random.Generator) -> list[Speck]:
     At least one speck is no longer where it was.
 
     Args:
-        specks: as they were.
         generator: decides about each.
     """
     now: list[Speck] = []

@@ -1,10 +1,14 @@
 """Noise between two frames of the same scene: pixel noise, streaks, row and frame offsets, slow drift of light.
 
-Levels are measured on real frames (`station.twin.digit.fit`). The real pixel noise is blotchy (colour is sampled
+Levels are measured on real frames (`benchmarks.twin.fit`). The real pixel noise is blotchy (colour is sampled
 at half the resolution and compressed): neighbours correlate as after a Gaussian blur of the widths below, and
 the channels as given. Pixel noise is cut from a bank of fields made once, at random places, since drawing nearly
 a million normal deviates per frame would cost more than all the rest.
 """
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -29,19 +33,28 @@ DRIFT_STEP_S = 0.2
 """The drift's field is drawn anew when this much time has passed."""
 
 
+@lru_cache(maxsize=1)  # of the sensor made last: who makes it again, as tests and benchmarks do, waits for no draw
+def _banks(levels: tuple[float, ...], seed: int) -> tuple[list[Array], Mapping[str, Any]]:
+    """Fields of pixel noise, and the state of the generator that has drawn them."""
+    generator = np.random.default_rng([seed, 3])
+    rows, columns = (side + _BANK_MARGIN for side in SENSOR_SHAPE)
+    mix = np.linalg.cholesky(_CHANNELS).T.astype(np.float32)
+    banks: list[Array] = []
+    for _ in range(_BANKS):
+        white = generator.standard_normal((rows, columns, 3), np.float32) @ mix
+        field = cv2.GaussianBlur(white, (0, 0), _BLUR_ACROSS_PX, sigmaY=_BLUR_DOWN_PX)
+        banks.append((field / field.std(axis=(0, 1)) * np.asarray(levels, np.float32)).astype(np.float32))
+    return banks, generator.bit_generator.state
+
+
 class FrameNoise:
     """Everything that is new in each frame."""
 
     def __init__(self, levels: NoiseLevels, seed: int) -> None:
         self._levels = levels
-        self._generator = np.random.default_rng([seed, 3])
-        rows, columns = (side + _BANK_MARGIN for side in SENSOR_SHAPE)
-        mix = np.linalg.cholesky(_CHANNELS).T.astype(np.float32)
-        self._banks: list[Array] = []
-        for _ in range(_BANKS):
-            white = self._generator.standard_normal((rows, columns, 3), np.float32) @ mix
-            field = cv2.GaussianBlur(white, (0, 0), _BLUR_ACROSS_PX, sigmaY=_BLUR_DOWN_PX)
-            self._banks.append((field / field.std(axis=(0, 1)) * levels.pixel).astype(np.float32))
+        self._banks, state = _banks(tuple(map(float, levels.pixel)), seed)
+        self._generator = np.random.default_rng()
+        self._generator.bit_generator.state = state
 
     def pixels(self) -> Array:
         """Pixel noise, shape (640, 480, 3), dtype float32; a view that must not be changed."""

@@ -1,4 +1,4 @@
-"""The numbers fitted on real images, which `python -m station.twin.digit.fit` writes into `fitted.npz`."""
+"""The numbers fitted on real images, which `python -m benchmarks.twin.fit` writes into `fitted.npz`."""
 
 from dataclasses import dataclass
 from importlib.resources import files

@@ -63,10 +63,7 @@ class DigitCameraServer:
 
     Args:
         world: what the gel feels.
-        sensor: draws the frames.
-        clock: the twin's time.
         faults: the switches, from `digit_faults`.
-        host: address to listen on.
         port: 0 for any that is free.
     """
 

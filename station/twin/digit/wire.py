@@ -36,9 +36,6 @@ def packed(kind: str, payload: bytes | memoryview = b"", **fields: float | str) 
 async def read_request(reader: asyncio.StreamReader) -> dict[str, Any]:
     """Read one request.
 
-    Args:
-        reader: the connection.
-
     Raises:
         ValueError: it is no request.
         asyncio.IncompleteReadError: the client has gone.

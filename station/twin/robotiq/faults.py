@@ -84,7 +84,6 @@ def gone(faults: FaultBoard, clock: Clock) -> bool:
     """Whether the gripper cannot be reached now.
 
     Args:
-        faults: the gripper's board.
         clock: the time by which `intermittent` comes and goes.
     """
     if faults.active(CommonFault.OFF):

@@ -19,7 +19,6 @@ async def disturbed(answer: bytes, faults: FaultBoard) -> bytes:
 
     Args:
         answer: the bytes as they should be.
-        faults: the gripper's board.
     """
     await asyncio.sleep(min(_LATEST_S, max(0.0, faults.amount(CommonFault.DELAYED))))
     return GARBAGE if faults.active(CommonFault.GARBAGE) else answer

@@ -79,7 +79,6 @@ def answer(request: bytes, gripper: RobotiqGripper) -> bytes | None:
 
     Args:
         request: unit, function and data, without CRC.
-        gripper: whose registers are read and written.
     """
     if request[0] != UNIT:
         return None

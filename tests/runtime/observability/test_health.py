@@ -11,17 +11,20 @@ import urllib.request
 
 import pytest
 
+from station.channel.panel_maintenance_queries import PartHealth
 from station.messages.message import verbatim
-from station.runtime.observability.health import Dependency, HealthServer, Liveness, Readiness
+from station.runtime.observability.health import HealthServer, Liveness, Readiness
 from station.serving.server import AddressError
 
 NOT_READY = Readiness(
     ready=False,
     why=verbatim("the camera does not answer; plug it in"),
     dependencies=(
-        Dependency("arm", "ok", 0.1),
-        Dependency("camera", "fault", 4.2, verbatim("no frame"), verbatim("plug it in")),
-        Dependency("plc", "unknown", None, verbatim("never heard"), verbatim("start it")),
+        PartHealth(name="arm", state="ok", age_s=0.1),
+        PartHealth(name="camera", state="fault", age_s=4.2, detail=verbatim("no frame"), remedy=verbatim("plug it in")),
+        PartHealth(
+            name="plc", state="unknown", age_s=None, detail=verbatim("never heard"), remedy=verbatim("start it")
+        ),
     ),
 )
 

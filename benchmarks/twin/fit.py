@@ -1,4 +1,4 @@
-"""Fit the twin's DIGIT on real images and write the numbers: `python -m station.twin.digit.fit PRESSES BACKGROUNDS`.
+"""Fit the twin's DIGIT on real images and write the numbers: `python -m benchmarks.twin.fit PRESSES BACKGROUNDS`.
 
 PRESSES holds `reference.jpg`, presses of a ball of 6 mm diameter, and `contacts.csv` with the contact's edge in
 each; BACKGROUNDS holds no-contact images of many units. Nothing but fitted numbers is written.
@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from station.errors import BadInputError
+from station.twin.digit import numbers
 from station.twin.digit.backgrounds import COSINES, FLOOR, cosine_basis
 from station.twin.digit.noise import Drift, FrameNoise
 from station.twin.digit.numbers import FILE, Array, NoiseLevels
 from station.twin.digit.optics import DIRECTIONS, PLACES, SLOPE_KNOTS, grid_places, slope_basis, slopes
-from station.twin.digit.statistics import NoiseStatistics, measure_noise
 from station.twin.gel import (
     GRID_SHAPE,
     GRID_STEP,
@@ -32,6 +32,8 @@ from station.twin.gel import (
     dent_mm,
     visible_edge_mm,
 )
+
+from .statistics import NoiseStatistics, measure_noise
 
 BALL_RADIUS_MM = 3.0
 SMOOTHING_MM = 0.1
@@ -236,19 +238,19 @@ def _strengths(found: NoiseStatistics) -> npt.NDArray[np.float64]:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Fit on two folders and write the file beside this module.
+    """Fit on two folders and write the file of the twin's sensor.
 
     Args:
         arguments: the folder of presses and the folder of backgrounds.
     """
     if len(arguments) != 2:
-        print("usage: python -m station.twin.digit.fit PRESSES BACKGROUNDS", file=sys.stderr)  # noqa: T201
+        print("usage: python -m benchmarks.twin.fit PRESSES BACKGROUNDS", file=sys.stderr)
         return 2
     reference, presses = read_presses(Path(arguments[0]))
     paths = sorted(Path(arguments[1]).glob("*.jpg"))
     backgrounds = [_read_image(path, (320, 240)) for path in paths]
     mean, modes, weights = fit_backgrounds([*backgrounds, reference])
-    target = Path(__file__).with_name(FILE)
+    target = Path(numbers.__file__).with_name(FILE)
     np.savez_compressed(
         target,
         table=fit_table(reference, presses).astype(np.float32),
@@ -258,7 +260,7 @@ def main(arguments: Sequence[str]) -> int:
         background_fitted=weights.astype(np.float32),
         **{f"noise_{name}": level for name, level in asdict(fit_noise(presses)).items()},
     )
-    print(f"{target}: fitted on {len(presses)} presses and {len(backgrounds)} backgrounds")  # noqa: T201
+    print(f"{target}: fitted on {len(presses)} presses and {len(backgrounds)} backgrounds")
     return 0
 
 

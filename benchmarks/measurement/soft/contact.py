@@ -15,8 +15,9 @@ import numpy as np
 
 from station.twin.contact import Footprint, Mask, Pose
 from station.twin.gel import GRID_SHAPE, GRID_STEP, SENSOR_SHAPE, FloatArray, Gel
-from station.twin.soft.body import SoftBody, SoftKind
-from station.twin.soft.skin import relief, waviness
+
+from .body import SoftBody, SoftKind
+from .skin import relief, waviness
 
 GEL_MM = (18.4, 15.8)
 """Height and width of the gel as the image sees it; what of a body lies beyond touches nothing."""

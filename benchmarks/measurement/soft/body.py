@@ -11,8 +11,9 @@ from enum import StrEnum
 import numpy as np
 
 from station.twin.gel import FloatArray
-from station.twin.soft.shape import ellipsoid_gap_mm, ring_gap_mm, rod_gap_mm
-from station.twin.soft.skin import Skin
+
+from .shape import ellipsoid_gap_mm, ring_gap_mm, rod_gap_mm
+from .skin import Skin
 
 
 class SoftKind(StrEnum):
