@@ -61,10 +61,26 @@ def test_contacts_that_touch_are_parted_at_their_neck():
     assert not (found[0] & found[1]).any()
 
 
-def test_a_weak_contact_is_a_small_disc_around_its_place(moved):
-    found = around((30, 100), moved(blob(30, 100, 8, 1.0), np.zeros(SHAPE, np.float32)), CONSTANTS)
-    assert len(found.regions) == 1
-    assert np.argwhere(found.regions[0]).mean(axis=0) == pytest.approx((100, 30), abs=0.5)
+def test_of_a_faint_body_belongs_what_stands_out_of_the_noise_though_an_achene_outshines_it(moved):
+    away = np.hypot(COLUMNS - 60, ROWS - 80)
+    ring = np.exp(-np.square((away - 25) / 4)).astype(np.float32)
+    level, achene = 2 * ring + blob(85, 80, 4, 12.0), blob(85, 80, 3, THRESHOLD)
+    (faint,) = body_candidates(moved(level, 1.5 * achene), THRESHOLD, CONSTANTS).regions
+    assert faint[80, 85]
+    assert faint[80, 35]
+    (firm,) = body_candidates(moved(level, 6 * achene), THRESHOLD, CONSTANTS).regions
+    assert firm[80, 85]
+    assert not firm[80, 35]
+
+
+def test_a_weak_contact_starts_from_a_small_disc_around_its_place_and_what_has_moved_with_it(moved):
+    curvature = np.zeros(SHAPE, np.float32)
+    (alone,) = around((30, 100), moved(blob(90, 30, 10, 4.0), curvature), CONSTANTS).regions
+    assert np.argwhere(alone).mean(axis=0) == pytest.approx((100, 30), abs=0.5)
+    (joined,) = around((30, 100), moved(blob(40, 100, 10, 4.0) + blob(90, 30, 10, 4.0), curvature), CONSTANTS).regions
+    assert (joined >= alone).all()
+    assert joined[100, 50]
+    assert not joined[30, 90]
 
 
 def test_a_disc_has_its_radius():

@@ -1,5 +1,6 @@
 """Press tracker: a press is one measurement, whose contact does not fall while the compression rises."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,9 @@ from benchmarks.measurement.soft.contact import SoftOnGel
 from station.settings.segmentation import RobustParameters
 from station.twin.contact import Pose
 from station.twin.digit.loaded import band_share
+from station.twin.digit.press import render_press
 from station.twin.digit.sensor import Condition, DigitSensor
+from station.twin.fruit import draw_fruit
 from station.vision.press import PressTracker
 from station.vision.robust import RobustMethod
 from station.vocabulary import Flag
@@ -263,3 +266,14 @@ def test_the_area_of_a_body_too_faint_for_an_edge_rises_with_what_has_changed():
         found.append(tracker.measure_step(frames))
     assert all(one.flags & {Flag.LOW_CONFIDENCE, Flag.UNDECIDED} for one in found)
     assert np.all(np.diff([one.area_px for one in found]) > 0)
+
+
+def test_a_soft_fruit_without_a_trusted_edge_is_returned_as_large_as_it_is_drawn_and_not_as_what_has_changed():
+    soft = replace(draw_fruit("strawberry", 20_000), bruised=True)
+    seen = render_press(soft, 20_000, (0.1, 0.2, 0.4, 0.8))
+    tracker = PressTracker(RobustMethod(seen.references, PARAMETERS))
+    found = [tracker.measure_step([frame]) for frame in seen.frames][2:]
+    assert all({Flag.LOW_CONFIDENCE, Flag.LOWER_BOUND} <= one.flags for one in found)
+    assert all(one.changed_area_px < 0.1 * one.area_px for one in found)
+    truths_px = [np.count_nonzero(mask) for mask in seen.true_masks[2:]]
+    assert [one.area_px for one in found] == pytest.approx(truths_px, rel=0.4)

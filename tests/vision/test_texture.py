@@ -46,6 +46,12 @@ def test_the_more_directions_agree_the_higher_an_element_ends():
     assert level(length, disc(75), 0.6) > 1.5 * level(length, disc(75), 0.2)
 
 
+def test_of_few_elements_each_ends_at_half_its_height_whatever_the_directions():
+    length = np.full(SHAPE, 20.0, np.float32)
+    assert level(length, disc(30), 0.1) == level(length, disc(30), 0.3) == pytest.approx(10, rel=0.1)
+    assert level(length, disc(75), 0.1) < 0.5 * level(length, disc(30), 0.1)
+
+
 def test_an_area_that_depends_on_its_level_is_less_sure():
     steep = 20.0 * (disc(40) > 0).astype(np.float32)
     gentle = np.maximum(0, 20 - 0.3 * np.hypot(COLUMNS - 120, ROWS - 160)).astype(np.float32)
