@@ -26,6 +26,7 @@ from typing import NamedTuple
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from revision import checked_out
 from sections import write
 
 from station.channel.client import ChannelClient
@@ -492,19 +493,13 @@ def inspected_otherwise(shipped: Mapping[str, Recipe]) -> dict[str, Pace]:
 
 def inspected_before(revision: str) -> dict[str, Pace]:
     """The same fruit by the station of a revision."""
-    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as home:
-        tree = Path(folder) / "tree"
-        git = ["git", "-C", str(ROOT), "worktree"]
-        subprocess.run([*git, "add", "--detach", str(tree), revision], check=True)
-        try:
-            file, configuration = configured(home)
-            with (
-                ended(start("twin", file, "--console", str(CONSOLE), tree=tree)),
-                ended(start("service", file, tree=tree)),
-            ):
-                return asyncio.run(inspect(configuration))
-        finally:
-            subprocess.run([*git, "remove", "--force", str(tree)], check=True)
+    with tempfile.TemporaryDirectory() as home, checked_out(revision) as tree:
+        file, configuration = configured(home)
+        with (
+            ended(start("twin", file, "--console", str(CONSOLE), tree=tree)),
+            ended(start("service", file, tree=tree)),
+        ):
+            return asyncio.run(inspect(configuration))
 
 
 def main() -> None:

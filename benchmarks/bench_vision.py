@@ -1,10 +1,17 @@
 """Milliseconds for each stage of the measurement methods on one thread, beside other libraries' same steps.
 
-Run with `./run bench vision`. Writes `docs/speed.md`.
+Run with `./run bench vision [--before REVISION]`. Writes `docs/speed.md`.
 """
 
+import argparse
 import functools
+import json
+import os
+import pickle
 import statistics
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable
 from importlib.metadata import version
@@ -12,6 +19,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from revision import checked_out
 from skimage.restoration import denoise_nl_means
 from sklearn.cluster import KMeans
 from threadpoolctl import threadpool_limits
@@ -94,6 +102,44 @@ def paper_rows(image: np.ndarray, reference: np.ndarray) -> list[tuple[str, floa
     ]
 
 
+def robust_ms(file: Path) -> list[float]:
+    """The robust method's milliseconds for each frame in a file of references and frames, in rounds."""
+    presses = pickle.loads(file.read_bytes())
+    steps = [
+        functools.partial(RobustMethod(references, RobustParameters()).measure, frame)
+        for references, frames in presses
+        for frame in frames
+    ]
+    return [
+        min(times) for times in zip(*([median_ms(step, RUNS) for step in steps] for _ in range(ROUNDS)), strict=True)
+    ]
+
+
+def paired_rows(revision: str) -> list[tuple[str, float, str, float | None]]:
+    """The robust method of an earlier revision and of this one, each in a process of its own, on the same frames."""
+    presses = [render_press(kind, 1, CLOSINGS_MM) for kind in FRUITS]
+    with checked_out(revision) as tree, tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "frames.pickle"
+        file.write_bytes(pickle.dumps([(press.references, press.frames) for press in presses]))
+        times = [
+            json.loads(
+                subprocess.run(
+                    [sys.executable, __file__, "--frames", str(file)],
+                    env={**os.environ, "PYTHONPATH": str(path)},
+                    capture_output=True,
+                    check=True,
+                ).stdout
+            )
+            for path in (tree, ROOT)
+        ]
+    before, now = (statistics.median(each) for each in times)
+    quicker = statistics.median(one / other for one, other in zip(*times, strict=True))
+    return [
+        (f"`robust` of revision {revision}, median of the same frames", before, "", None),
+        (f"`robust` beside it, {quicker:.2f} times as quick", now, "", None),
+    ]
+
+
 def whole_rows() -> list[tuple[str, float, str, float | None]]:
     """Both methods as a whole, in turn on the same frames: each frame's best of some rounds, and the frames' median."""
     robust: dict[str, list[float]] = {}
@@ -120,11 +166,21 @@ def whole_rows() -> list[tuple[str, float, str, float | None]]:
 
 def main() -> None:
     """Measure on one thread, print and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--before", metavar="REVISION", help="time the robust method of this revision beside today's")
+    parser.add_argument("--frames", type=Path, help=argparse.SUPPRESS)  # how `--before` runs each of the two
+    wanted = parser.parse_args()
     cv2.setNumThreads(1)
+    if wanted.frames:
+        with threadpool_limits(1):
+            print(json.dumps(robust_ms(wanted.frames)))
+        return
     press = render_press("raspberry", 1, [CLOSINGS_MM[1]])
     image, reference = press.frames[0], press.references[0]
     with threadpool_limits(1):
         rows = paper_rows(image, reference) + whole_rows()
+    if wanted.before:
+        rows += paired_rows(wanted.before)
     lines = [
         "# Speed of the measurement",
         "",

@@ -32,7 +32,7 @@ FRAMES_PER_STEP = 3
 """As in the recipes; the station measures their mean."""
 FRAMES_PER_S = 30.0
 TWIN_SEEDS = (0, 2600)
-"""Of the first press of each fruit; nothing was chosen on the second."""
+"""Of the first press of each fruit; on the second only the two numbers of faint bodies were chosen."""
 BRUISED_FRUITS = FRUITS[:3]
 BRUISED_SEEDS = (20000, 22800)
 """As `TWIN_SEEDS`."""
