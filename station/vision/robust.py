@@ -432,7 +432,8 @@ class RobustMethod:
         if state.confidence >= least or state.load_levels < self._constants.released_share * before.load_levels:
             return
         shown_px = round(cv2.countNonZero(state.mask) * state.changed.size / state.mask.size)
-        # An outline that hardly holds any change has been drawn around nothing.
+        # An outline that hardly holds any change, where hardly anything curves, has been drawn around nothing. A soft
+        # fruit's holds little change too: the flat middle of its contact is most of it.
         drawn = state.gate > 1 or cv2.countNonZero(state.changed) >= self._constants.witness_least * shown_px
         held = state.mask | before.least if drawn else before.least
         if not drawn or np.array_equal(held, before.least):

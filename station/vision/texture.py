@@ -29,7 +29,8 @@ def strength(length: FloatImage, region: Mask) -> float:
 def element_level(length: FloatImage, region: Mask, coherence: float, constants: Constants) -> float:
     """The change from which on a place belongs to an element that is pressed in, grey levels.
 
-    The more elements there are, the less the outermost are pressed, and the less their directions agree.
+    The more elements there are, the less the outermost are pressed, and the less their directions agree. Where there is
+    room for a few only, directions say nothing, and each ends at about half its height.
 
     Args:
         length: of the change, shape (height, width), grey levels.
