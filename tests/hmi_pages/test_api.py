@@ -30,12 +30,12 @@ OPERATIONS = (
 )
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def reading(token_of: Callable[[str, Role], str]) -> str:
     return token_of("reading", Role.VIEWER)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def writing(token_of: Callable[[str, Role], str]) -> str:
     return token_of("writing", Role.OPERATOR)
 
