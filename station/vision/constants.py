@@ -14,6 +14,7 @@ Grid = Literal["working", "half", "quarter", ""]
 NORMAL_OF_MEDIAN = 1.4826
 """A normal distribution's standard deviation over its median absolute deviation."""
 
+_BY_LEVELS = "fit: of the level at which the union has the true area, on one part's fruit; held against the other's"
 _BY_TRIALS = "fit: by trials on 200 tuning presses, not by the search; held against `--check`"
 
 
@@ -119,9 +120,11 @@ class Constants:
         0.04, "of the strong change", "level of an element where directions are random", "fit"
     )
     element_coherent: float = constant(0.72, "of the strong change", "how much higher per unit of coherence", "fit")
-    element_lone: float = constant(0.46, "of the strong change", "the same of a lone element, half its height", "fit")
+    element_lone: float = constant(
+        0.46, "of the strong change", "the same of a lone element, half its height", _BY_LEVELS
+    )
     few_elements_px: float = constant(
-        5000.0, "px", "area of a region beyond which its elements are many", "fit", "working"
+        5000.0, "px", "area of a region beyond which its elements are many", _BY_LEVELS, "working"
     )
     half_sure: float = constant(
         0.38, "", "logarithm of the areas at two levels at which the confidence is halved", "fit"

@@ -38,8 +38,8 @@ def element_level(length: FloatImage, region: Mask, coherence: float, constants:
         coherence: the region's.
         constants: the levels.
     """
-    p, area_px = constants, cv2.countNonZero(region)
-    few = min(1.0, (p.few_elements_px / max(area_px, 1)) ** 2)
+    p = constants
+    few = min(1.0, (p.few_elements_px / cv2.countNonZero(region)) ** 2)
     share = max(p.element_random + p.element_coherent * coherence, p.element_lone * few)
     return share * strength(length, region)
 
