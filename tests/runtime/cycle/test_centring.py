@@ -10,15 +10,19 @@ from station.press import motion, procedure
 from station.runtime.cycle import actions
 
 FRUIT, RIGHT_MM, DOWN_MM = 16, 1.0, 0.8
+OVERSHOOT_MM = 2.0
+"""How far the sweep overshoots is left to the machine; a touch that is lighter than this has no clear middle."""
 
 
 @pytest.mark.timeout(300)
 def test_the_arm_follows_the_first_contact_and_the_fruit_that_the_border_cut_passes(bench, roomy, monkeypatch):
     sweeps = []
 
-    def swept(*arguments):
-        sweeps.append(arguments)
-        return motion.sweep(*arguments)
+    async def swept(rig, *arguments):
+        met = await motion.sweep(rig, *arguments)
+        sweeps.append(met)
+        await rig.close_to(met.width_mm - OVERSHOOT_MM)
+        return met
 
     monkeypatch.setattr(actions, "sweep", swept)
     monkeypatch.setattr(procedure, "sweep", swept)
