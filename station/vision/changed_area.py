@@ -13,8 +13,6 @@ from station.vision.region import Movement
 
 _PER_E_FOLD = 4.0
 """How fast the confidence falls with the logarithm by which only the contour has shrunk: to a half at 16 %."""
-_NOISES = 4.0
-"""A place has changed beyond this many standard deviations of the background's own noise."""
 
 
 def changed(moved: Movement, noise_levels: float, constants: Constants) -> Mask:
@@ -23,13 +21,13 @@ def changed(moved: Movement, noise_levels: float, constants: Constants) -> Mask:
     Args:
         moved: from `region.movement`.
         noise_levels: the change's standard deviation where nothing touches.
-        constants: the threshold.
+        constants: the threshold in grey levels, and in times the noise.
 
     Returns:
         Shape (height, width) at half the working size, 0 or 1.
     """
     length = moved.length * moved.flat_field
-    return (length > max(constants.changed_levels, _NOISES * noise_levels)).astype(np.uint8)
+    return (length > max(constants.changed_levels, constants.reliable_ratio * noise_levels)).astype(np.uint8)
 
 
 def agreement(contact_px: float, changed_px: float, constants: Constants) -> float:
