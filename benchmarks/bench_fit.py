@@ -46,6 +46,8 @@ followed from step to step, from before the first touch.
 | fruit, bruised | fruit of the twin in seven conditions, from the first touch to a firm grip |
 | border | contacts that the border cuts, against their visible part |
 | soft ball ... long | the twin's soft bodies, from no touch to a full field |
+| fruit alone ... soft alone | images of the same presses, each measured by itself; of soft bodies every third |
+| shadow | untouched real backgrounds with a soft shadow, or a stain of one colour |
 
 A data set's cost is the sum of these means; a perfect measurement has 0.
 

@@ -62,10 +62,7 @@ class Constants:
     # Detection
     curvature_blur: float = constant(5.0, "px", "smoothing before the slopes", "fit", "working")
     curvature_window: float = constant(7.5, "px", "window of the structure tensor", "fit", "working")
-    sure_gate: float = constant(2.0, "of the threshold", "from here on contact is sure", "fit")
-    wide_share: float = constant(0.3, "of the frame", "a body so large curves the gel evenly", "fit")
-    wide_levels: float = constant(6.0, "grey level", "and moves so much of it as far", "measured: drift reaches 0.5")
-    wide_threshold: float = constant(0.6, "of the threshold", "is enough for such a body", "fit")
+    sure_gate: float = constant(2.5, "of the threshold", "from here on contact is sure, below it is faint", "fit")
     # Candidates
     level_window: float = constant(3.0, "px", "window of the change's level", "fit", "half")
     candidate_share: float = constant(0.5, "of the strong level", "a place from here on belongs to a candidate", "fit")
@@ -108,7 +105,6 @@ class Constants:
     smooth_at_one: float = constant(1.36, "", "the same, extrapolated to a radius of one pixel", "fit")
     smooth_per_size: float = constant(0.222, "per e-fold of the radius", "how it falls with the radius", "fit")
     halo_over_least: float = constant(1.5, "of the least curvature", "the halo curves no more", "fit")
-    halo_curvature: float = constant(0.5, "grey level/px", "nor more than this", "fit")
     curved_quantile: float = constant(0.6, "", "quantile of the region's curvature at which the gain is clipped", "fit")
     curved_share: float = constant(0.28, "of that", "where the curved region ends", "fit")
     fine_on_skin: float = constant(

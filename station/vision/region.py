@@ -204,7 +204,7 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
     Without background the halo's level is the body's; achenes and drupelets curve the gel, and the halo does not.
     """
     p = constants
-    halo = min(p.halo_over_least * quantile(thinned(moved.curvature), _FLOOR_QUANTILE), p.halo_curvature)
+    halo = p.halo_over_least * quantile(thinned(moved.curvature), _FLOOR_QUANTILE)
     curvature = np.sqrt(np.maximum(np.square(moved.curvature) - np.float32(halo**2), 0), dtype=np.float32)
     cap = max(quantile(curvature[region > 0], p.curved_quantile), NEXT_TO_NOTHING)
     gain = _clipped(curvature, cap) - np.float32(p.curved_share)
@@ -241,19 +241,6 @@ def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float
         return 0.0
     fine, whole = (quantile(length_squared(one)[inside], 0.5) for one in (elements - slopes, elements))
     return fine / max(whole, NEXT_TO_NOTHING)
-
-
-def has_moved_widely(moved: Movement, constants: Constants) -> bool:
-    """Whether much of the frame has moved far beyond what drift leaves over.
-
-    On real backgrounds with noise, streaks and drift the level reached there was 0.5, of balls over 85 mm² 15.
-
-    Args:
-        moved: from `movement`.
-        constants: how much of the frame, and how far.
-    """
-    levels = level_of(moved, constants.level_window).levels
-    return quantile(thinned(levels), 1 - constants.wide_share) > constants.wide_levels
 
 
 class Level(NamedTuple):
