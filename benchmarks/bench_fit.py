@@ -22,7 +22,19 @@ from fit.reference import reference_table
 from fit.reliability import PICTURE, reliability
 from fit.runner import Runner
 from fit.search import fitted_names, found_table, search
-from fit.sensitivity import ERRORS, LEAST_EFFECT, RECIPE, far_table, sensitivity, store, stored, table, trial, values
+from fit.sensitivity import (
+    ERRORS,
+    LEAST_EFFECT,
+    RECIPE,
+    far_table,
+    out_table,
+    sensitivity,
+    store,
+    stored,
+    table,
+    trial,
+    values,
+)
 from fit.stages import stages_table
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -95,6 +107,12 @@ def constants(runner: Runner, cache: Path) -> None:
         "Those that matter only so.",
         "",
         *far_table(found),
+        "",
+        "### Left out",
+        "",
+        "Those that matter neither so: the value at which a constant does nothing, and what that costs.",
+        "",
+        *out_table(found),
     ]
     document.write_section("Constants", lines)
 
@@ -106,8 +124,8 @@ def fixed() -> None:
         f"The method has {fitted} constants, each with its unit, meaning and origin in `station/vision/constants.py`,",
         f"and {count} numbers that its modules declare: how finely something is computed, what a sensor cannot show,",
         f"and sizes of places. That makes {fitted + count}. Counted alike there were {BEFORE} on {BEFORE_DATE}, before",
-        "the pipeline was rebuilt and the fit written. Some of the candidates for removal above were left out, and",
-        "what that cost brought them back: [the history](decisions/robust-method-history.md).",
+        "the pipeline was rebuilt and the fit written. What was left out and what that cost is in",
+        "[the history](decisions/robust-method-history.md).",
         "",
         *fixed_table(),
     ]
