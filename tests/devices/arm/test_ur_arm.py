@@ -378,6 +378,7 @@ def test_a_pose_out_of_range_is_not_driven_to(bench, healthy):
 def test_a_cut_link_in_mid_move_stops_the_arm_and_comes_back_by_itself(healthy_arm, until):
     async def run():
         async with healthy_arm(poses=AWAY, joint_speed_rad_s=0.5) as (bench, arm):
+            bench.forgive_no_silence()
             move = asyncio.create_task(arm.move_to("home"))
             await until(lambda: moving(bench))
             bench.faults.set("link_cut")
@@ -595,6 +596,7 @@ def test_a_station_that_is_not_healthy_any_more_has_its_arm_stopped_by_the_contr
     async def run():
         async with bench() as made, UrArm(made.settings(poses=AWAY, joint_speed_rad_s=0.2)) as arm:
             await arm.ready(20.0)
+            made.forgive_no_silence()
             arm.renew_health(0.5)
             move = asyncio.create_task(arm.move_to("home"))
             assert await cause_of(move) is ArmCause.WATCHDOG
