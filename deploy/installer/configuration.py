@@ -38,5 +38,6 @@ def try_with(layout: Layout, release: Path) -> tuple[str, ...]:
 def migrate(layout: Layout, release: Path) -> None:
     """Migrate the configuration to a release. Idempotent."""
     program = release / "venv" / "bin" / "station"
-    for line in run(program, "config", "migrate", "--write", layout.configuration).splitlines():
+    output = run(program, "config", "migrate", "--write", layout.configuration, environment=layout.environment())
+    for line in output.splitlines():
         print_progress(line)

@@ -106,7 +106,7 @@ def make(layout: Layout, source: Source, packages: Packages) -> Path:
     for name in COPIED:
         shutil.copytree(source.folder / name, release / name, ignore=shutil.ignore_patterns("__pycache__"))
     _make_environment(release / "venv", source.folder, packages)
-    run(release / "venv" / "bin" / "station", "--version")
+    run(release / "venv" / "bin" / "station", "--version", environment=layout.environment())
     _open_to_all(release)
     size_bytes = sum(file.lstat().st_size for file in release.rglob("*") if file.is_file() and not file.is_symlink())
     stamp = {"version": source.version, "fingerprint": source.fingerprint, "python": sys.version, "bytes": size_bytes}

@@ -49,7 +49,8 @@ def begun_cells(folder: Path) -> Iterator[Callable[..., Cell]]:
         configuration = folder / f"station_{len(cells)}.yaml"
         configuration.write_text(
             f"arm: {{host: {host}}}\n"
-            f"gripper: {{urcap: {{host: {host}}}, modbus_rtu: {{host: {host}}}, answer_timeout_s: 2.0}}\n"
+            "gripper: {answer_timeout_s: 2.0, move_margin_s: 8.0, "
+            f"urcap: {{host: {host}}}, modbus_rtu: {{host: {host}}}}}\n"
             f"camera: {{oldest_s: 1.0, twin: {{port: {free_port()}}}}}\n"
         )
         command = [sys.executable, "-m", "station", "twin", "--console", "0", "--config", str(configuration)]

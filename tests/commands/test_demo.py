@@ -26,7 +26,9 @@ def demo(tmp_path, unused_ports):
     (tmp_path / "station.yaml").write_text(
         f"modbus: {{port: {modbus}}}\nmetrics: {{port: {metrics}}}\nhmi: {{port: {hmi}}}\n"
         f"arm: {{host: {host}, stale_after_s: 1.0, link_lost_after_s: 4.0, watchdog_hz: 0.5}}\n"
-        f"gripper: {{urcap: {{host: {host}}}, modbus_rtu: {{host: {host}}}, answer_timeout_s: 2.0}}\n"
+        "gripper: {answer_timeout_s: 2.0, move_margin_s: 8.0, "
+        f"urcap: {{host: {host}}}, modbus_rtu: {{host: {host}}}}}\n"
+        "handshake: {begin_deadline_s: 10.0, station_lost_after_s: 30.0, plc_heartbeat_timeout_s: 30.0}\n"
         f"camera: {{oldest_s: 1.0, twin: {{port: {camera}}}}}\n"
         "service: {patience: 10.0, inspection_deadline_s: null}\n"
     )

@@ -1,5 +1,6 @@
 """`station devices check` against a twin with one thing wrong at a time."""
 
+import re
 import subprocess
 import sys
 
@@ -11,6 +12,8 @@ from station.messages import gripper as gripper_messages
 from station.messages.message import verbatim
 from tests.hosts import fresh_host
 
+SLOW = 24.0
+"""Frames/s below which a camera of 30 is slow."""
 DEVICES = ("arm controller", "arm RTDE", "arm programs", "gripper", "camera")
 
 
@@ -22,7 +25,13 @@ def verdicts(output: str) -> dict[str, str]:
 def test_a_sound_cell_names_every_device_with_what_it_is(shared_cell):
     done = shared_cell.station("devices", "check")
     assert done.returncode == 0, done.stderr
-    assert verdicts(done.stdout) == dict.fromkeys(DEVICES, "ok") | {"gripper": "warning"}
+    # On a busy machine the twin draws fewer frames than the camera should give, and that is said.
+    found = re.search(r"480x640, ([\d.]+) frames/s", done.stdout)
+    assert found
+    slow = str(camera_messages.REMEDY_SLOW(rate=30.0)) in done.stdout
+    assert float(found[1]) <= SLOW if slow else float(found[1]) >= SLOW
+    camera = "warning" if slow else "ok"
+    assert verdicts(done.stdout) == dict.fromkeys(DEVICES, "ok") | {"gripper": "warning", "camera": camera}
     assert str(gripper_messages.CHECK_NOT_ACTIVE()) in done.stdout
     assert "PolyScope 5.22" in done.stdout
     assert "480x640" in done.stdout

@@ -30,8 +30,9 @@ def form_of(layout):
 
 
 def test_a_running_station_is_upgraded_or_left_as_it_was(
-    stand_in, installer, installation, install, unused_ports, sources
+    stand_in, installer, installation, install, unused_ports, sources, monkeypatch
 ):
+    monkeypatch.setenv("PYTHONPATH", str(sources["0.1.0"]))  # a person's own is no matter to a release's programs
     refused, failed = installer("messages").Refused, installer("messages").Failed
     layout, settings = stand_in.layout, stand_in.layout.configuration
     modbus, hmi, metrics = unused_ports(3)

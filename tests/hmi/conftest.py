@@ -249,7 +249,12 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
         "modbus": {"port": modbus},
         "metrics": {"port": metrics},
         "hmi": {"port": hmi, "cleaning_s": 5},
-        "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
+        "gripper": {
+            "urcap": {"host": host},
+            "modbus_rtu": {"host": host},
+            "answer_timeout_s": 2.0,
+            "move_margin_s": 8.0,
+        },
         "camera": {"oldest_s": 3.0, "twin": {"port": camera}},
         "handshake": {"station_lost_after_s": 30.0},
         "records": {"free_reserve_mb": 1},

@@ -52,6 +52,8 @@ from station.vocabulary import Reason
 from tests.hosts import fresh_host
 
 PATIENCE_S = 120.0
+PATIENT_HANDSHAKE = {"begin_deadline_s": 10.0, "station_lost_after_s": 30.0, "plc_heartbeat_timeout_s": 30.0}
+"""For a station that a busy machine lets wait: one that is lost for a second has its fruit called off."""
 LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
 PEOPLE = {"Ada": Role.ADMIN, "Quin": Role.QUALITY, "Rosa": Role.QUALITY, "Max": Role.MAINTENANCE}
 PIN = "735192"
@@ -236,6 +238,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
             "move_margin_s": 8.0,
         },
         "camera": {"oldest_s": 3.0, "twin": {"port": free_port()}},
+        "handshake": PATIENT_HANDSHAKE,
         "metrics": {"port": free_port()},
         "modbus": {"port": free_port()},
         "hmi": {"port": port, "idle_s": 3600.0},

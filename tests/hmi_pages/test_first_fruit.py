@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from hmi.web.user_store import UserStore
 from station.records.database import FILE_NAME
-from tests.hmi_pages.conftest import PATIENCE_S, PIN, Person, begun, free_port, quick_recipes
+from tests.hmi_pages.conftest import PATIENCE_S, PATIENT_HANDSHAKE, PIN, Person, begun, free_port, quick_recipes
 from tests.hosts import fresh_host
 
 pytestmark = pytest.mark.timeout(600)
@@ -35,8 +35,14 @@ class Fresh:
         values = {
             "home": str(folder / "home"),
             "recipes_folder": str(quick_recipes(folder / "recipes")),
-            "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 4.0},
+            "gripper": {
+                "urcap": {"host": host},
+                "modbus_rtu": {"host": host},
+                "answer_timeout_s": 4.0,
+                "move_margin_s": 8.0,
+            },
             "camera": {"oldest_s": 3.0, "twin": {"port": free_port()}},
+            "handshake": PATIENT_HANDSHAKE,
             "metrics": {"port": free_port()},
             "modbus": {"port": free_port()},
             "hmi": {"port": self.port, "idle_s": 3600.0},

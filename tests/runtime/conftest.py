@@ -212,7 +212,12 @@ def settings_file(tmp_path: Path) -> Callable[..., Path]:
                 "watchdog_hz": 0.5,
                 "constructor_limit_s": 60.0,
             },
-            "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
+            "gripper": {
+                "urcap": {"host": host},
+                "modbus_rtu": {"host": host},
+                "answer_timeout_s": 2.0,
+                "move_margin_s": 4.0,
+            },
             "camera": {"oldest_s": 3.0, "twin": {"port": free_port()}},
             "metrics": {"port": free_port()},
             "records": {"free_reserve_mb": 1},

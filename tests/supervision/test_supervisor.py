@@ -9,7 +9,7 @@ import sys
 import psutil
 import pytest
 
-from station.supervision import restarts
+from station.supervision import restarts, supervisor
 from station.supervision.notify import notify
 from station.supervision.restarts import RESTARTS_VARIABLE
 from station.supervision.supervisor import RESTARTS, SupervisionError
@@ -63,9 +63,11 @@ def test_what_makes_no_progress_is_killed_and_started_again(bench, until):
 
 
 def test_what_dies_again_and_again_is_given_up_and_the_rest_goes_on(bench, until, monkeypatch):
-    async def let_it_die(supervisor, ended):
+    monkeypatch.setattr(supervisor, "RESTARTS_WITHIN_S", 600.0)  # so many starts take a busy machine more than a minute
+
+    async def let_it_die(supervising, ended):
         for restart in range(RESTARTS + 1):
-            await until(lambda count=restart + 1: len(bench.pids("second")) == count and supervisor.ready("second"))
+            await until(lambda count=restart + 1: len(bench.pids("second")) == count and supervising.ready("second"))
             os.kill(bench.pids("second")[-1], signal.SIGKILL)
         await until(lambda: "is not started again" in bench.caplog.text)
         monkeypatch.setenv(RESTARTS_VARIABLE, environment(bench.pids("first")[0])[RESTARTS_VARIABLE])
@@ -80,13 +82,15 @@ def test_what_dies_again_and_again_is_given_up_and_the_rest_goes_on(bench, until
 
 
 @pytest.mark.parametrize(
-    ("how", "words"), [("dies", "ended with exit code 3 before it was ready"), ("mute", "was not ready after 2 s")]
+    ("how", "limit_s", "words"),
+    [("dies", 20.0, "ended with exit code 3 before it was ready"), ("mute", 2.0, "was not ready after 2 s")],
 )
-def test_what_does_not_become_ready_ends_everything_with_its_name(bench, how, words):
+def test_what_does_not_become_ready_ends_everything_with_its_name(bench, how, limit_s, words):
     with pytest.raises(SupervisionError, match=f"the process second {words}"):
-        bench.run([bench.program("first"), bench.program("second", how, start_limit_s=2.0)], end)
+        bench.run([bench.program("first"), bench.program("second", how, start_limit_s=limit_s)], end)
     assert not bench.ready
-    assert not psutil.pid_exists(bench.pids("second")[0])
+    # Not by what it writes: on a busy machine Python itself has not begun after 2 s.
+    assert not psutil.Process().children()
 
 
 def test_what_does_not_hear_sigterm_is_killed(bench):

@@ -21,6 +21,9 @@ from station.twin.ur.script import RuntimeState
 
 AWAY = ArmPoses(home=(2.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0))
 """A home that is a long way off."""
+A_TENTH = 9.0
+"""Of its speed, by the fault `slow`: an arm that is to be stopped on its way does not arrive before, however busy the
+machine."""
 
 
 async def moving(bench) -> bool:
@@ -34,7 +37,13 @@ async def cause_of(awaitable) -> ArmCause:
     return caught.value.cause
 
 
-def test_it_goes_from_pose_to_pose_and_says_where_it_is(healthy_arm):
+async def is_young(arm: UrArm) -> bool:
+    """Whether the state came just now, which on a busy machine not each one does."""
+    age_s = (await arm.state()).age_s
+    return age_s is not None and 0.0 <= age_s < 0.1
+
+
+def test_it_goes_from_pose_to_pose_and_says_where_it_is(healthy_arm, until):
     async def run():
         async with healthy_arm() as (bench, arm):
             for pose in ("above_nest", "nest", "above_nest", "accept", "accept"):
@@ -43,8 +52,7 @@ def test_it_goes_from_pose_to_pose_and_says_where_it_is(healthy_arm):
                 assert state.ready
                 assert state.at == pose
                 assert state.moving is False
-                assert state.age_s is not None
-                assert state.age_s < 0.1
+                await until(lambda: is_young(arm))
                 assert bench.controller.joints_rad == pytest.approx(bench_pose(arm, pose), abs=1e-6)
             x, y, z = (await arm.state()).tool_position_mm
             assert (x / 1000, y / 1000, z / 1000) == pytest.approx(bench.controller.tool_position_m(), abs=1e-6)
@@ -119,6 +127,7 @@ def test_it_keeps_to_the_speeds_and_goes_straight_to_the_nest(healthy_arm):
 def test_a_stop_in_mid_move_brakes_and_ends_the_move(healthy_arm, until):
     async def run():
         async with healthy_arm(poses=AWAY) as (bench, arm):
+            bench.faults.set("slow", A_TENTH)
             move = asyncio.create_task(arm.move_to("home"))
             await until(lambda: moving(bench))
             assert await cause_of(arm.move_to("accept")) is ArmCause.BUSY
@@ -129,6 +138,7 @@ def test_a_stop_in_mid_move_brakes_and_ends_the_move(healthy_arm, until):
             assert state.ready
             assert state.at is None
             await arm.stop()
+            bench.faults.clear("slow")
             await arm.move_to("home")
             assert (await arm.state()).at == "home"
 
@@ -139,6 +149,7 @@ def test_a_stop_in_mid_move_brakes_and_ends_the_move(healthy_arm, until):
 def test_a_stop_at_the_very_beginning_of_a_move_stops_it_too(healthy_arm, until, turns):
     async def run():
         async with healthy_arm(poses=AWAY, joint_speed_rad_s=0.5) as (bench, arm):
+            bench.faults.set("slow", A_TENTH)
             move = asyncio.create_task(arm.move_to("home"))
             for _ in range(turns):
                 await asyncio.sleep(0)
@@ -153,6 +164,7 @@ def test_a_stop_at_the_very_beginning_of_a_move_stops_it_too(healthy_arm, until,
 def test_a_cancelled_move_is_stopped(healthy_arm, until):
     async def run():
         async with healthy_arm(poses=AWAY) as (bench, arm):
+            bench.faults.set("slow", A_TENTH)
             move = asyncio.create_task(arm.move_to("home"))
             await until(lambda: moving(bench))
             move.cancel()
@@ -279,7 +291,13 @@ def test_a_slow_arm_goes_on_at_a_fraction_of_its_speed(healthy_arm, until):
         async with healthy_arm(poses=AWAY) as (bench, arm):
             bench.faults.set("slow", 4.0)
             move = asyncio.create_task(arm.move_to("home"))
-            await until(lambda: max(map(abs, bench.controller.body.speeds_rad_s)) == pytest.approx(0.4, rel=1e-3))
+
+            async def at_a_fifth() -> bool:
+                if move.done():
+                    await move  # which says why
+                return max(map(abs, bench.controller.body.speeds_rad_s)) == pytest.approx(0.4, rel=1e-3)
+
+            await until(at_a_fifth)
             bench.faults.clear("slow")
             await move
 
@@ -360,6 +378,7 @@ def test_a_pose_out_of_range_is_not_driven_to(bench, healthy):
 def test_a_cut_link_in_mid_move_stops_the_arm_and_comes_back_by_itself(healthy_arm, until):
     async def run():
         async with healthy_arm(poses=AWAY, joint_speed_rad_s=0.5) as (bench, arm):
+            bench.forgive_no_silence()
             move = asyncio.create_task(arm.move_to("home"))
             await until(lambda: moving(bench))
             bench.faults.set("link_cut")
@@ -577,6 +596,7 @@ def test_a_station_that_is_not_healthy_any_more_has_its_arm_stopped_by_the_contr
     async def run():
         async with bench() as made, UrArm(made.settings(poses=AWAY, joint_speed_rad_s=0.2)) as arm:
             await arm.ready(20.0)
+            made.forgive_no_silence()
             arm.renew_health(0.5)
             move = asyncio.create_task(arm.move_to("home"))
             assert await cause_of(move) is ArmCause.WATCHDOG

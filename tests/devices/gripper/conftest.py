@@ -22,16 +22,27 @@ SCENARIO_LIMIT_S = 30.0
 
 
 class SkippingClock:
-    """The machine's time, which a test can also run ahead."""
+    """The machine's time, which a test can also run ahead, or hold: fingers then do what they do however busy it is."""
 
     def __init__(self) -> None:
         self._skipped_s = 0.0
+        self._held_s: float | None = None
 
     def now_s(self) -> float:
-        return time.monotonic() + self._skipped_s
+        return (time.monotonic() if self._held_s is None else self._held_s) + self._skipped_s
 
     def skip(self, duration_s: float) -> None:
         self._skipped_s += duration_s
+
+    def hold(self) -> None:
+        """Let no time pass but what is skipped."""
+        self._held_s = time.monotonic()
+
+    def go_on(self) -> None:
+        """Let it pass again, from where it was held."""
+        assert self._held_s is not None
+        self._skipped_s -= time.monotonic() - self._held_s
+        self._held_s = None
 
 
 class Server(Protocol):

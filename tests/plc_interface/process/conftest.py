@@ -20,6 +20,9 @@ from plc_interface.registers.map import BY_NAME, GROUP_BY_NAME
 from tests.plc_interface.scripted_station import PATIENCE_S, ScriptedStation, until
 
 COMMAND = (sys.executable, "-m", "station", "plc", "run")
+PATIENT = {"handshake_begin_deadline_s": 10.0, "handshake_station_lost_after_s": 30.0}
+"""Where no limit is to pass, none does on a busy machine either."""
+LIMIT_S = 2.0
 
 
 class Plc:
@@ -129,7 +132,7 @@ class Cell:
         self._environment = {name: text for name, text in os.environ.items() if not name.startswith("STATION_")} | {
             "STATION_HOME": str(home),
             "STATION_MODBUS_PORT": str(port),
-            **{f"STATION_{name.upper()}": str(value) for name, value in settings.items()},
+            **{f"STATION_{name.upper()}": str(value) for name, value in {**PATIENT, **settings}.items()},
         }
         (home / "run").mkdir()
 
@@ -200,6 +203,12 @@ def cell(short_folder: Path, unused_port: int) -> Callable[..., contextlib.Abstr
             await made.close()
 
     return running
+
+
+@pytest.fixture
+def limit_s() -> float:
+    """Of what a test lets pass: what is to come within it does so on a busy machine too."""
+    return LIMIT_S
 
 
 @pytest.fixture

@@ -70,9 +70,9 @@ def test_a_program_that_knows_no_size_reads_and_writes_as_before(cell):
 
 
 @pytest.mark.parametrize("lost", ["station", "interface"])
-def test_the_outcome_of_a_fruit_whose_station_or_interface_died_has_its_size(cell, lost):
+def test_the_outcome_of_a_fruit_whose_station_or_interface_died_has_its_size(cell, lost, limit_s):
     async def scenario():
-        async with cell(handshake_station_lost_after_s=0.4) as made:
+        async with cell(handshake_station_lost_after_s=limit_s) as made:
             station, plc = made.station, await made.plc()
             await plc.arm("buffer_results")
             await plc.write(fruit_length_mm_x10=480, size_class=3)

@@ -64,9 +64,10 @@ def test_a_fruit_from_enable_to_acknowledge(cell, eventually, order):
     asyncio.run(scenario())
 
 
-def test_every_refusal_is_told_with_its_reason_and_counted(cell):
+def test_every_refusal_is_told_with_its_reason_and_counted(cell, limit_s):
     async def scenario():
-        async with cell(handshake_begin_deadline_s=0.3) as made:
+        limits = {"handshake_begin_deadline_s": limit_s, "handshake_station_lost_after_s": limit_s}
+        async with cell(**limits) as made:
             station, plc = made.station, await made.plc()
             told: list[tuple[str, int]] = []
 
@@ -170,9 +171,9 @@ def test_eight_results_wait_and_none_is_dropped(cell):
     asyncio.run(scenario())
 
 
-def test_bits_that_the_plc_forgets_block_nothing(cell, eventually):
+def test_bits_that_the_plc_forgets_block_nothing(cell, eventually, limit_s):
     async def scenario():
-        async with cell(handshake_handshake_timeout_s=0.3) as made:
+        async with cell(handshake_handshake_timeout_s=limit_s) as made:
             station, plc = made.station, await made.plc()
             await plc.arm("buffer_results")
             await plc.set("trigger", trigger_id=1)
@@ -206,9 +207,9 @@ def test_bits_that_the_plc_forgets_block_nothing(cell, eventually):
     asyncio.run(scenario())
 
 
-def test_a_plc_that_stands_still_or_goes_is_disarmed_and_its_results_are_kept(cell, eventually):
+def test_a_plc_that_stands_still_or_goes_is_disarmed_and_its_results_are_kept(cell, eventually, limit_s):
     async def scenario():
-        async with cell(handshake_plc_heartbeat_timeout_s=0.4) as made:
+        async with cell(handshake_plc_heartbeat_timeout_s=limit_s) as made:
             station, plc = made.station, await made.plc()
             await plc.arm("buffer_results")
             await plc.trigger(1)
@@ -246,9 +247,9 @@ def test_a_second_writer_is_refused(cell):
     asyncio.run(scenario())
 
 
-def test_a_station_that_dies_while_it_inspects(cell, eventually):
+def test_a_station_that_dies_while_it_inspects(cell, eventually, limit_s):
     async def scenario():
-        async with cell(handshake_station_lost_after_s=0.4) as made:
+        async with cell(handshake_station_lost_after_s=limit_s) as made:
             station, plc = made.station, await made.plc()
             await plc.arm("buffer_results")
             await plc.trigger(1, encoder=5)
@@ -346,9 +347,9 @@ def test_an_interface_that_is_killed_continues_where_it_was(cell, eventually):
     asyncio.run(scenario())
 
 
-def test_commands_are_carried_out_once(cell):
+def test_commands_are_carried_out_once(cell, limit_s):
     async def scenario():
-        async with cell(handshake_command_deadline_s=0.3) as made:
+        async with cell(handshake_command_deadline_s=limit_s, handshake_station_lost_after_s=limit_s) as made:
             station, plc = made.station, await made.plc()
             await plc.wait("online")
 
