@@ -154,7 +154,6 @@ class Constants:
         0.9, "of the last area", "the next step confirms a contact that it contains", "fit"
     )
     # Witness
-    changed_levels: float = constant(4.0, "grey level", "a place has changed from here on", "fit")
     witness_most: float = constant(4.5, "of the contact area", "more changed than this is a disagreement", "fit")
     witness_least: float = constant(0.1, "of the contact area", "less changed than this is a disagreement", "fit")
     # Confidence
