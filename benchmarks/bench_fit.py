@@ -1,6 +1,6 @@
 """Fit of the robust method's constants, and what defends them: sensitivity, stages, reliability.
 
-Run with `./run bench fit` for the search alone, `--all` for everything (under an hour on two cores) or one of the other
+Run with `./run bench fit` for the search alone, `--all` for everything (about an hour on two cores) or one of the other
 parts. Each part writes its section of `docs/robust-constants.md`. `--check NAME=VALUE ...` prints what changed
 constants cost and writes nothing. Images are rendered once and kept in `--cache`.
 """
