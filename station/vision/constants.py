@@ -105,6 +105,7 @@ class Constants:
     smooth_at_one: float = constant(1.36, "", "the same, extrapolated to a radius of one pixel", "fit")
     smooth_per_size: float = constant(0.222, "per e-fold of the radius", "how it falls with the radius", "fit")
     halo_over_least: float = constant(1.5, "of the least curvature", "the halo curves no more", "fit")
+    halo_curvature: float = constant(0.5, "grey level/px", "nor more than this", "fit")
     curved_quantile: float = constant(0.6, "", "quantile of the region's curvature at which the gain is clipped", "fit")
     curved_share: float = constant(0.28, "of that", "where the curved region ends", "fit")
     fine_on_skin: float = constant(

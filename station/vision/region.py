@@ -204,7 +204,7 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
     Without background the halo's level is the body's; achenes and drupelets curve the gel, and the halo does not.
     """
     p = constants
-    halo = p.halo_over_least * quantile(thinned(moved.curvature), _FLOOR_QUANTILE)
+    halo = min(p.halo_over_least * quantile(thinned(moved.curvature), _FLOOR_QUANTILE), p.halo_curvature)
     curvature = np.sqrt(np.maximum(np.square(moved.curvature) - np.float32(halo**2), 0), dtype=np.float32)
     cap = max(quantile(curvature[region > 0], p.curved_quantile), NEXT_TO_NOTHING)
     gain = _clipped(curvature, cap) - np.float32(p.curved_share)
