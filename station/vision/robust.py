@@ -27,6 +27,7 @@ from station.vision.region import (
     Region,
     find_region,
     flat_field_correction,
+    has_moved_widely,
     movement,
 )
 from station.vision.weak_contact import WeakContactDetector, WeakResponse
@@ -316,7 +317,11 @@ class RobustMethod:
         noise = curvature_noise(response, state.background)
         state.threshold = max(self._parameters.gate_ratio * noise, self._least_curvature)
         state.moved = movement(state.difference, state.background, self._flat_field, response)
-        state.gate = float(response.max()) / state.threshold
+        # A large smooth body curves the gel evenly and leaves its halo for background.
+        strongest = float(response.max())
+        if strongest <= state.threshold and has_moved_widely(state.moved, self._constants):
+            state.threshold *= self._constants.wide_threshold
+        state.gate = strongest / state.threshold
 
     def _see_what_changed(self, state: State) -> None:
         """Find where the image has changed at all, contact or halo."""
