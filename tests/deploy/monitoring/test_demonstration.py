@@ -8,7 +8,7 @@ from prometheus_client.parser import text_string_to_metric_families as parse
 from benchmarks.archive import postgres
 from benchmarks.monitoring.asking import panels, promql, rules, sql, used
 from benchmarks.monitoring.month import LINKS, PHASES
-from benchmarks.monitoring.site import STATION, demonstration
+from benchmarks.monitoring.site import STATION, WEEK, demonstration
 from station.runtime.observability.metrics_table import TABLE, exposed_name
 from tests.hosts import fresh_host
 
@@ -20,7 +20,7 @@ def unanswered(site):
     asked = [
         *((f"rule {name}", expr) for name, expr in rules()),
         *(
-            (f"{panel.board}: {panel.title}", promql(target["expr"], STATION, "1m", week="3s"))
+            (f"{panel.board}: {panel.title}", promql(target["expr"], STATION, "1m", week=WEEK))
             for panel in panels()
             for target in panel.targets
             if "expr" in target
