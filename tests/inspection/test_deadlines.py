@@ -203,6 +203,21 @@ def test_a_recipe_that_takes_longer_than_the_plc_can_be_told_is_refused():
     assert BeginReply.model_fields["deadline_s"].metadata[1].le == LONGEST_S
 
 
+def test_an_inspection_may_take_exactly_what_the_plc_can_be_told(monkeypatch):
+    needed_s = deadlines(RECIPE, PACE).inspection_s
+    monkeypatch.setattr("station.inspection.deadlines.LONGEST_S", needed_s)
+    assert deadlines(RECIPE, PACE).inspection_s == needed_s
+
+
+def test_a_press_goes_on_to_the_last_of_all_limits():
+    limits = RECIPE.damage.area
+    further = limits[-1].model_copy(update={"closing_mm": limits[-1].closing_mm + 2.0})
+    damage = RECIPE.damage.model_copy(update={"area": (*limits, further)})
+    here, there = (deadlines(one, PACE) for one in (RECIPE, RECIPE.model_copy(update={"damage": damage})))
+    presses, step_s = RECIPE.press.attempts, 0.05 + 0.2 + 0.035 + 0.1
+    assert there.longest_path_s - here.longest_path_s == pytest.approx(presses * 2 * step_s)
+
+
 def test_an_inspections_phases_are_those_in_which_the_station_is_busy():
     busy = {state for state, facts in STATES.items() if facts.refusal == Refusal.BUSY}
     assert busy <= set(FAULT_OF)
