@@ -156,9 +156,7 @@ def weak_contacts(seed: int) -> list[PressData]:
             options = PressOptions(pose=Pose(x_px, y_px), unit=DETECTION_UNITS[number % 2])
             closings_mm = light_closings(kind, seed + number, options)[:2]
             fruit = draw_fruit(kind, seed + number)
-            press = on_the_twin.squeezed_with_masks(
-                fruit, seed + number, options, [0.6 * closings_mm[0], *closings_mm]
-            )
+            press = on_the_twin.squeezed_with_masks(fruit, seed + number, options, [0.6 * closings_mm[0], *closings_mm])
             found.append(PressData(f"{kind}, weak", *press))
     return found
 
