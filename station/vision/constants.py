@@ -63,7 +63,10 @@ class Constants:
     curvature_blur: float = constant(5.0, "px", "smoothing before the slopes", "fit", "working")
     curvature_window: float = constant(7.5, "px", "window of the structure tensor", "fit", "working")
     sure_gate: float = constant(2.5, "of the threshold", "from here on contact is sure, below it is faint", "fit")
-    wide_share: float = constant(0.3, "of the frame", "having changed, a body may curve the gel evenly", "fit")
+    wide_share: float = constant(0.3, "of the frame", "a body so large curves the gel evenly", "fit")
+    wide_levels: float = constant(
+        6.0, "grey level", "and moves so much of it as far", "measured: 4.6 untouched at JPEG 30"
+    )
     wide_threshold: float = constant(0.6, "of the threshold", "is enough for such a body", "fit")
     # Candidates
     level_window: float = constant(3.0, "px", "window of the change's level", "fit", "half")

@@ -243,6 +243,17 @@ def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float
     return fine / max(whole, NEXT_TO_NOTHING)
 
 
+def has_moved_widely(moved: Movement, constants: Constants) -> bool:
+    """Whether much of the frame has moved far beyond what drift and compression leave over.
+
+    Args:
+        moved: from `movement`.
+        constants: how much of the frame, and how far.
+    """
+    levels = level_of(moved, constants.level_window).levels
+    return quantile(thinned(levels), 1 - constants.wide_share) > constants.wide_levels
+
+
 class Level(NamedTuple):
     """How far each place has moved."""
 

@@ -27,6 +27,7 @@ from station.vision.region import (
     Region,
     find_region,
     flat_field_correction,
+    has_moved_widely,
     movement,
 )
 from station.vision.weak_contact import WeakContactDetector, WeakResponse
@@ -204,7 +205,6 @@ class RobustMethod:
             self._bridge_debris,
             self._respond,
             self._see_what_changed,
-            self._set_threshold,
             self._find_candidates,
             self._outline_candidates,
             self._drop_unsupported,
@@ -312,23 +312,20 @@ class RobustMethod:
             state.difference = self._debris.bridged(state.difference)
 
     def _respond(self, state: State) -> None:
-        """Compute the curvature response, and how far each place has moved."""
+        """Compute the curvature response and the threshold from which on something touches."""
         response = curvature(state.difference, _FINE_STEP, self._constants)
+        noise = curvature_noise(response, state.background)
+        state.threshold = max(self._parameters.gate_ratio * noise, self._least_curvature)
         state.moved = movement(state.difference, state.background, self._flat_field, response)
+        # A large smooth body curves the gel evenly and leaves its halo for background.
+        strongest = float(response.max())
+        if strongest <= state.threshold and has_moved_widely(state.moved, self._constants):
+            state.threshold *= self._constants.wide_threshold
+        state.gate = strongest / state.threshold
 
     def _see_what_changed(self, state: State) -> None:
         """Find where the image has changed at all, contact or halo."""
         state.changed = changed(state.moved, state.background.spread_levels, self._constants)
-
-    def _set_threshold(self, state: State) -> None:
-        """Set the threshold of the curvature from which on something touches."""
-        response = state.moved.curvature
-        strongest, noise = float(response.max()), curvature_noise(response, state.background)
-        state.threshold = max(self._parameters.gate_ratio * noise, self._least_curvature)
-        # A large smooth body curves the gel evenly and leaves its halo for background.
-        if strongest <= state.threshold and float(np.mean(state.changed)) > self._constants.wide_share:
-            state.threshold *= self._constants.wide_threshold
-        state.gate = strongest / state.threshold
 
     def _follow(self, state: State) -> None:
         """Take over what was in contact at the last trusted step; once the body has been let go the press is over."""
