@@ -1,6 +1,6 @@
 """Fit of the robust method's constants, and what defends them: sensitivity, stages, reliability.
 
-Run with `./run bench fit` for the search alone, `--all` for everything (under an hour on two cores) or one of the other
+Run with `./run bench fit` for the search alone, `--all` for everything (about an hour on two cores) or one of the other
 parts. Each part writes its section of `docs/robust-constants.md`. `--check NAME=VALUE ...` prints what changed
 constants cost and writes nothing. Images are rendered once and kept in `--cache`.
 """
@@ -22,7 +22,19 @@ from fit.reference import reference_table
 from fit.reliability import PICTURE, reliability
 from fit.runner import Runner
 from fit.search import fitted_names, found_table, search
-from fit.sensitivity import ERRORS, LEAST_EFFECT, RECIPE, far_table, sensitivity, store, stored, table, trial, values
+from fit.sensitivity import (
+    ERRORS,
+    LEAST_EFFECT,
+    RECIPE,
+    far_table,
+    out_table,
+    sensitivity,
+    store,
+    stored,
+    table,
+    trial,
+    values,
+)
 from fit.stages import stages_table
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -45,7 +57,10 @@ followed from step to step, from before the first touch.
 | weak contact | contacts of about 0.7 to 2 mm² of four fruits, three frames a step |
 | fruit, bruised | fruit of the twin in seven conditions, from the first touch to a firm grip |
 | border | contacts that the border cuts, against their visible part |
+| large ball | firm balls of 26 to 44 mm that leave little background |
 | soft ball ... long | the twin's soft bodies, from no touch to a full field |
+| fruit alone ... soft alone | images of the same presses, each measured by itself; of soft bodies every third |
+| shadow | untouched real backgrounds with a soft shadow, or a stain of one colour |
 
 A data set's cost is the sum of these means; a perfect measurement has 0.
 
@@ -93,6 +108,12 @@ def constants(runner: Runner, cache: Path) -> None:
         "Those that matter only so.",
         "",
         *far_table(found),
+        "",
+        "### Left out",
+        "",
+        "Those that matter neither so: the value at which a constant does nothing, and what that costs.",
+        "",
+        *out_table(found),
     ]
     document.write_section("Constants", lines)
 
@@ -104,8 +125,8 @@ def fixed() -> None:
         f"The method has {fitted} constants, each with its unit, meaning and origin in `station/vision/constants.py`,",
         f"and {count} numbers that its modules declare: how finely something is computed, what a sensor cannot show,",
         f"and sizes of places. That makes {fitted + count}. Counted alike there were {BEFORE} on {BEFORE_DATE}, before",
-        "the pipeline was rebuilt and the fit written. Some of the candidates for removal above were left out, and",
-        "what that cost brought them back: [the history](decisions/robust-method-history.md).",
+        "the pipeline was rebuilt and the fit written. What was left out and what that cost is in",
+        "[the history](decisions/robust-method-history.md).",
         "",
         *fixed_table(),
     ]

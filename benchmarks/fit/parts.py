@@ -1,4 +1,4 @@
-"""Data sets of the fit in two parts, one to fit on and one held back: rendered once, at the working size, and cached.
+"""Data sets of the fit in two parts, one to fit on and one held back: rendered once, and cached.
 
 Nothing is chosen on the part that is held back. The cache's files carry a hash of the code that renders them.
 """
@@ -10,23 +10,21 @@ from functools import partial
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-import cv2
-import numpy as np
-from bench_measurement import noisy
-from measurement import on_the_twin
-from measurement.at_the_border import PLACES
 from measurement.data_sets import PressData, cached, fruit_presses, in_processes, read, real_presses, soft_presses
-from measurement.light_touch import DETECTION_PLACES, DETECTION_UNITS, light_closings
-from measurement.soft_bodies import KINDS, moved_specks, with_jpeg, with_video
-from measurement.untouched import CONDITIONS
+from measurement.soft_bodies import KINDS
 
+from fit.images import (
+    border,
+    compressed,
+    large_balls,
+    moved_debris,
+    other_units,
+    shadows,
+    untouched,
+    untouched_twin,
+    weak_contacts,
+)
 from fit.progress import report
-from station.twin.contact import Pose
-from station.twin.digit.press import PressOptions
-from station.twin.digit.sensor import DigitSensor
-from station.vision.contact import Image
-from station.vision.step import mean_image
-from station.vision.working import working_image
 
 ROOT = Path(__file__).resolve().parents[2]
 RENDERING = (
@@ -34,7 +32,7 @@ RENDERING = (
     *(ROOT / "benchmarks" / "measurement" / f"{name}.py" for name in ("data_sets", "on_the_twin", "soft_bodies")),
     ROOT / "benchmarks" / "measurement" / "at_the_border.py",
     ROOT / "benchmarks" / "bench_measurement.py",
-    Path(__file__),
+    Path(__file__).with_name("images.py"),
 )
 """Code on which the rendered images depend."""
 
@@ -47,6 +45,7 @@ SEEDS: dict[Part, dict[str, int]] = {
         "border": 43000,
         "debris": 61000,
         "weak": 62000,
+        "large": 51000,
         "unit": 33000,
         "noise": 1,
     },
@@ -57,6 +56,7 @@ SEEDS: dict[Part, dict[str, int]] = {
         "border": 44000,
         "debris": 71000,
         "weak": 72000,
+        "large": 52000,
         "unit": 32000,
         "noise": 2,
     },
@@ -65,11 +65,8 @@ SEEDS: dict[Part, dict[str, int]] = {
 FRUIT_STEPS = (0, 1, 3, 4, 6, 8, 10)
 """Of the closings, to save time: nothing touching, weak contacts, and firm ones up to the largest."""
 SOFT_SEEDS = 4
-BORDER_CLOSINGS_MM = (1.2, 2.5, 5.0)
-AFTER_S = (5.0, 11.0)
-"""Since the reference."""
-LEAST_QUALITY, MOST_QUALITY = 30, 60
-"""JPEG's: files from the web."""
+SOFT_EVERY = 3
+"""Of a soft body's steps, as many are measured by themselves: up to the last, a full field."""
 
 
 class Group(NamedTuple):
@@ -122,122 +119,23 @@ def groups(part: Part, images: Path, cache: Path) -> Groups:
         "untouched twin": Group(data("untouched-twin", partial(untouched_twin, seeds["unit"]))),
         "moved debris": Group(data("debris", partial(moved_debris, seeds["debris"])), 0.25),
         "other unit": Group(other_units(own), 0.25, scored="judged"),
+        "shadow": Group(data("shadow", partial(shadows, own, seeds["noise"])), 0.25),
         "weak contact": Group(data("weak", partial(weak_contacts, seeds["weak"])), 0.5, scored="found"),
         # Followed as by the station.
         "fruit": Group(fruit, followed=True),
         "bruised": Group(bruised, followed=True),
         "border": Group(data("border", partial(border, seeds["border"]))),
+        "large ball": Group(data("large", partial(large_balls, seeds["large"])), 0.5),
     }
     for kind in KINDS:
         presses = [press for press in soft if press.group == kind]
         found[kind.replace("_", " ")] = Group(presses, 0.5, followed=True)
-    return found
-
-
-def untouched(backgrounds: list[Image], seed: int, draws: int = 3) -> list[PressData]:
-    """Backgrounds of real units, each against itself with noise and drift."""
-    found: list[PressData] = []
-    for number, background in enumerate(backgrounds):
-        generator = np.random.default_rng([seed, number])
-        reference = _larger(background) if number % 2 else background
-        frames = [working_image(noisy(reference, generator)) for _ in range(draws)]
-        found.append(_empty("untouched", [working_image(reference)], frames))
-    return found
-
-
-def compressed(backgrounds: list[Image], seed: int) -> list[PressData]:
-    """The same, reference and frames stored as JPEG of low quality, or as one video."""
-    found: list[PressData] = []
-    for number, background in enumerate(backgrounds):
-        generator = np.random.default_rng([seed, number, 1])
-        reference = _larger(background) if number % 2 else background
-        for _ in range(2):
-            quality = int(generator.integers(LEAST_QUALITY, MOST_QUALITY + 1))
-            stored = with_jpeg([reference, noisy(reference, generator)], quality)
-            found.append(_empty("JPEG", [working_image(stored[0])], [working_image(stored[1])]))
-        # Several frames on: by then the codec has passed on what the first key frame left out.
-        film = with_video([reference, *(noisy(reference, generator) for _ in range(4))])
-        found.append(_empty("video", [working_image(film[0])], [working_image(film[-1])]))
-    return found
-
-
-def other_units(backgrounds: list[Image]) -> list[PressData]:
-    """Untouched frames of one real unit against the reference of the next, of the same size."""
-    sizes = {one.shape for one in backgrounds}
-    found: list[PressData] = []
-    for shape in sorted(sizes):
-        own = [one for one in backgrounds if one.shape == shape]
-        pairs = zip(own, [*own[1:], own[0]], strict=True) if len(own) > 1 else ()
-        found += [_empty("other unit", [working_image(a)], [working_image(b)]) for a, b in pairs]
-    return found
-
-
-def untouched_twin(seed: int, units: int = 24) -> list[PressData]:
-    """Untouched units of the twin as they drift away from their reference, in four conditions."""
-    found: list[PressData] = []
-    for unit in range(seed, seed + units):
-        for condition in CONDITIONS:
-            options = on_the_twin.conditions()[condition]
-            sensor = DigitSensor(unit, unit, options.noise, options.drift)
-            references = [
-                sensor.frame(None, k / on_the_twin.FRAMES_PER_S, options.condition) for k in range(options.references)
-            ]
-            frames = [
-                [
-                    sensor.frame(None, after_s + k / on_the_twin.FRAMES_PER_S, options.condition)
-                    for k in range(on_the_twin.FRAMES_PER_STEP)
-                ]
-                for after_s in AFTER_S
-            ]
-            found.append(
-                _empty(
-                    f"untouched, {condition}",
-                    [working_image(one) for one in references],
-                    [working_image(mean_image(step)) for step in frames],
-                )
-            )
-    return found
-
-
-def moved_debris(seed: int, pairs: int = 12) -> list[PressData]:
-    """Untouched gel of the twin with specks of debris, some of which have moved since the reference."""
-    return [
-        _empty(
-            "moved debris", [working_image(one) for one in pair.references], [working_image(mean_image(pair.frames))]
-        )
-        for pair in moved_specks(range(seed, seed + pairs))
-    ]
-
-
-def weak_contacts(seed: int) -> list[PressData]:
-    """Contacts of about 0.7, 1 and 2 mm² of each fruit at several places on two units."""
-    found: list[PressData] = []
-    for kind in on_the_twin.FRUITS:
-        for number, (x_px, y_px) in enumerate(DETECTION_PLACES):
-            options = PressOptions(pose=Pose(x_px, y_px), unit=DETECTION_UNITS[number % 2])
-            closings_mm = light_closings(kind, seed + number, options)[:2]
-            press = on_the_twin.squeezed_with_masks(
-                kind, seed + number, options, closings_mm=[0.6 * closings_mm[0], *closings_mm]
-            )
-            found.append(PressData(f"{kind}, weak", *press))
-    return found
-
-
-def border(seed: int) -> list[PressData]:
-    """Contacts that the border cuts, two fruits at each place of `at_the_border`: the truth is their visible part."""
-    found: list[PressData] = []
-    for place, middles in PLACES.items():
-        for number, (x_px, y_px) in enumerate(middles):
-            for kind in on_the_twin.FRUITS[number % 2 :: 2]:
-                options = PressOptions(pose=Pose(x_px, y_px), unit=number or None)
-                references, images, truths = on_the_twin.squeezed_with_masks(
-                    kind, seed + number, options, closings_mm=BORDER_CLOSINGS_MM
-                )
-                cut = [any(side.any() for side in (t[[0, -1]], t[:, [0, -1]])) for t in truths]
-                seen = [k for k, is_cut in enumerate(cut) if is_cut]
-                if seen:
-                    kept = [images[k] for k in seen], [truths[k] for k in seen]
-                    found.append(PressData(f"{kind}, {place}", references, *kept))
+    # As in an analysis of single images, where no earlier step says what touches.
+    found |= {
+        "fruit alone": Group(fruit, 0.25),
+        "bruised alone": Group(bruised, 0.25),
+        "soft alone": Group([_last_of_three(press) for press in soft], 0.25),
+    }
     return found
 
 
@@ -246,15 +144,9 @@ def _some_steps(press: PressData) -> PressData:
     return press._replace(images=images, truths=truths)
 
 
-def _empty(group: str, references: list[Image], frames: list[Image]) -> PressData:
-    return PressData(group, references, frames, [np.zeros(frame.shape[:2], np.bool_) for frame in frames])
-
-
-def _larger(image: Image) -> Image:
-    """As a camera of 640x480 would give it: its noise is finer than the working size."""
-    if max(image.shape) >= 640:
-        return image
-    return np.asarray(cv2.resize(image, (480, 640), interpolation=cv2.INTER_CUBIC), np.uint8)
+def _last_of_three(press: PressData) -> PressData:
+    images, truths = (some[SOFT_EVERY - 1 :: SOFT_EVERY] for some in (press.images, press.truths))
+    return press._replace(images=images, truths=truths)
 
 
 def _version(images: Path) -> str:

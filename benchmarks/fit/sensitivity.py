@@ -1,4 +1,7 @@
-"""Sensitivity: what it costs to change each constant by a fifth, and far more where that changes nothing."""
+"""Sensitivity: what it costs to change each constant.
+
+By a fifth first; far where that is free; and where that is free too, to a value at which it does nothing.
+"""
 
 import json
 from dataclasses import fields, replace
@@ -18,6 +21,26 @@ ERRORS = 2.0
 """Standard errors beyond which an effect is more than the choice of seeds."""
 RECIPE = ("gate_ratio", "least_bend", "edge_stiffness", "smallest_contact_px")
 """The recipe's parameters that are changed in the same way, at their defaults."""
+OUT = {
+    "border_chord": 2.0,
+    "confirmed_share": 2.0,
+    "corner_chord": 2.0,
+    "displacement_prior": 1e-6,
+    "fine_on_skin": 1e9,
+    "flat_field_floor": 1e6,
+    "halo_over_least": 0.0,
+    "highest_harmonic": 1e6,
+    "lit_share": -1.0,
+    "most_drift_share": 1e9,
+    "pattern_blur": 0.3,
+    "saturated_share": 2.0,
+    "stripe_prior": 1e9,
+    "support_least": 0.0,
+    "wide_threshold": 1.0,
+    "recipe: edge_stiffness": 1e-9,
+    "recipe: smallest_contact_px": 0.0,
+}
+"""Values at which a constant does nothing, of those of which near and far values may all do alike."""
 
 
 class Change(NamedTuple):
@@ -45,6 +68,8 @@ class Sensitivity(NamedTuple):
     near: tuple[Change, Change]
     wide: tuple[Change, Change] | None
     """Where neither near change matters."""
+    out: Change | None = None
+    """With what it is for left out, where no other change matters."""
 
     @property
     def matters(self) -> bool:
@@ -53,8 +78,9 @@ class Sensitivity(NamedTuple):
 
     @property
     def matters_at_all(self) -> bool:
-        """Whether it matters when changed far, at least."""
-        return self.matters or self.wide is None or any(change.matters for change in self.wide)
+        """Whether it matters when changed far, or left out, at least."""
+        far = (*(self.wide or ()), *([] if self.out is None else [self.out]))
+        return self.matters or any(change.matters for change in far)
 
     @property
     def size(self) -> float:
@@ -94,22 +120,32 @@ def trial(name: str, value: float, base: Trial | None = None) -> Trial:
 
 def sensitivity(runner: Runner) -> list[Sensitivity]:
     """The effects of every constant, the largest first."""
-    base = runner.shipped()
-    near = _changes(runner, "sensitivity", list(values()), NEAR, base)
+    near = _changes(runner, "sensitivity", list(values()), NEAR)
     still = [name for name, changes in near.items() if not any(change.matters for change in changes)]
-    wide = _changes(runner, "sensitivity, far", still, WIDE, base)
+    wide = _changes(runner, "sensitivity, far", still, WIDE)
     found = [Sensitivity(name, value, near[name], wide.get(name)) for name, value in values().items()]
-    return sorted(found, key=lambda one: -one.size)
+    return left_out(runner, sorted(found, key=lambda one: -one.size))
+
+
+def left_out(runner: Runner, found: list[Sensitivity]) -> list[Sensitivity]:
+    """The same, with what it costs to leave out what does not matter otherwise."""
+    still = [row.name for row in found if not row.matters_at_all and row.name in OUT]
+    changes = dict(zip(still, _effects(runner, "left out", [(name, OUT[name]) for name in still]), strict=True))
+    return [row._replace(out=changes.get(row.name)) for row in found]
 
 
 def _changes(
-    runner: Runner, name: str, names: list[str], factors: tuple[float, float], base: Scores
+    runner: Runner, name: str, names: list[str], factors: tuple[float, float]
 ) -> dict[str, tuple[Change, Change]]:
     now = values()
-    new = [(one, changed(now[one], factor)) for one in names for factor in factors]
-    scores = runner.run(name, [trial(*one) for one in new], base=Base(Trial(), base))
-    found = [_change(runner, value, after, base) for (_, value), after in zip(new, scores, strict=True)]
+    found = _effects(runner, name, [(one, changed(now[one], factor)) for one in names for factor in factors])
     return {one: (found[2 * k], found[2 * k + 1]) for k, one in enumerate(names)}
+
+
+def _effects(runner: Runner, name: str, new: list[tuple[str, float]]) -> list[Change]:
+    base = runner.shipped()
+    scores = runner.run(name, [trial(*one) for one in new], base=Base(Trial(), base))
+    return [_change(runner, value, after, base) for (_, value), after in zip(new, scores, strict=True)]
 
 
 def _change(runner: Runner, value: float, scores: Scores | None, base: Scores) -> Change:
@@ -130,8 +166,10 @@ def stored(path: Path) -> list[Sensitivity] | None:
     if not path.exists():
         return None
     rows = [
-        Sensitivity(name, value, _pair(near), None if wide is None else _pair(wide))
-        for name, value, near, wide in json.loads(path.read_text())
+        Sensitivity(
+            name, value, _pair(near), None if wide is None else _pair(wide), None if out is None else Change(*out)
+        )
+        for name, value, near, wide, out in json.loads(path.read_text())
     ]
     return [row for row in rows if row.name in values()]
 
@@ -158,8 +196,8 @@ def table(found: list[Sensitivity]) -> list[str]:
             lines.append(f"| `{row.name}` | {row.value:g} | {cells} | {worst.suffers} |")
     never = [f"`{row.name}`" for row in found if not row.matters_at_all]
     summary = (
-        f"Matter when changed by a fifth: {sum(row.matters for row in found)} of {len(found)}. Do not matter even at "
-        f"{WIDE[0]:g} or {WIDE[1]:g} times, candidates for removal ({len(never)}): {', '.join(never) or 'none'}."
+        f"Matter when changed by a fifth: {sum(row.matters for row in found)} of {len(found)}. Matter neither at "
+        f"{WIDE[0]:g} or {WIDE[1]:g} times nor when left out ({len(never)}): {', '.join(never) or 'none'}."
     )
     return [*lines, "", summary]
 
@@ -168,9 +206,17 @@ def far_table(found: list[Sensitivity]) -> list[str]:
     """The effects of the far changes, of the constants that matter only so."""
     lines = [f"| constant | cost at x{WIDE[0]:g} | at x{WIDE[1]:g} | what suffers |", "|---|---|---|---|"]
     for row in found:
-        if row.wide is not None and row.matters_at_all:
+        if row.wide is not None and any(change.matters for change in row.wide):
             worst = max(row.wide, key=lambda change: change.effect)
             lines.append(f"| `{row.name}` | {' | '.join(_cell(one) for one in row.wide)} | {worst.suffers} |")
+    return lines
+
+
+def out_table(found: list[Sensitivity]) -> list[str]:
+    """The table of what it costs to leave out what the constants are for that matter neither near nor far."""
+    lines = ["| constant | value | left out by | cost | what suffers |", "|---|---|---|---|---|"]
+    rows = [(row, row.out) for row in found if row.out is not None]
+    lines += [f"| `{row.name}` | {row.value:g} | {out.value:g} | {_cell(out)} | {out.suffers} |" for row, out in rows]
     return lines
 
 

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from measurement import on_the_twin
+from station.twin.fruit import draw_fruit
 from station.vision.contact import Image
 from station.vision.step import mean_image
 from station.vision.working import working_image
@@ -76,7 +77,8 @@ def fruit_presses(seed: int, *, bruised: bool) -> DataSet:
     found: DataSet = []
     for kind in kinds:
         for number, (name, options) in enumerate(on_the_twin.conditions().items()):
-            press = on_the_twin.squeezed_with_masks(kind, seed + number, options, bruised=bruised)
+            fruit = draw_fruit(kind, seed + number, bruised=bruised)
+            press = on_the_twin.squeezed_with_masks(fruit, seed + number, options)
             found.append(PressData(f"{kind}, {name}", *press))
     return found
 

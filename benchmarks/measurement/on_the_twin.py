@@ -13,7 +13,7 @@ from station.settings.segmentation import RobustParameters
 from station.twin.contact import FruitOnGel, Pose
 from station.twin.digit.press import PressOptions
 from station.twin.digit.sensor import Condition, DigitSensor
-from station.twin.fruit import draw_fruit
+from station.twin.fruit import Fruit, draw_fruit
 from station.twin.gel import MM_PER_PX, Gel
 from station.twin.squeeze import Squeeze
 from station.vision.contact import Image
@@ -97,15 +97,10 @@ def squeezed(
 
 
 def squeezed_with_masks(
-    kind: str,
-    seed: int,
-    options: PressOptions,
-    *,
-    bruised: bool = False,
-    closings_mm: Sequence[float] = CLOSINGS_MM,
+    fruit: Fruit, seed: int, options: PressOptions, closings_mm: Sequence[float] = CLOSINGS_MM
 ) -> tuple[list[Image], list[Image], list[npt.NDArray[np.bool_]]]:
     """The references, the steps' mean images and the true masks of a press, all at the working size."""
-    fruit, gel = replace(draw_fruit(kind, seed), bruised=bruised), Gel()
+    gel = Gel()
     sensor = DigitSensor(seed, options.unit, options.noise, options.drift)
     on_gel = FruitOnGel(fruit, options.pose, gel)
     references = [sensor.frame(None, k / FRAMES_PER_S, options.condition) for k in range(options.references)]

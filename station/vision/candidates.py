@@ -17,10 +17,10 @@ _STRONG_SHARE, _LOW_QUANTILE = 0.6, 0.3
 """Of the strongest curvature, what counts as curved; and the quantile of the level there that a body mostly reaches."""
 _OVER_SPREAD = 3.0
 """In standard deviations of the background's level: a candidate is as far above it."""
-_FAINT_SPREADS, _FAINT_GATE = 8.0, 2.5
-"""A faint body, whose gate is lower, has moved wherever it is so many standard deviations above the background's level:
-one achene or a part of the rim may outshine all else of it. At 7 and 10 the 95th percentile of bruised fruit's errors
-is 0.58 and 0.56 in place of 0.55; with a gate of 2 and 3 that of sound fruit is 0.245 and 0.244 in place of 0.237."""
+_FAINT_SPREADS = 8.0
+"""A faint body has moved wherever it is so many standard deviations above the background's level: one achene or a part
+of the rim may outshine all else of it. At 7 and 10 the 95th percentile of bruised fruit's errors is 0.58 and 0.56 in
+place of 0.55."""
 _OWN_SHARE = 0.35
 """Of its own strongest place: what belongs to one of several contacts, so that a strong neighbour hides none."""
 _WEAK_RADIUS_PX = 7
@@ -46,7 +46,7 @@ def body_candidates(moved: Movement, threshold: float, constants: Constants) -> 
     Args:
         moved: from `region.movement`.
         threshold: the detection threshold, grey levels per pixel; each region reaches it.
-        constants: window and share.
+        constants: window and share, and the gate below which a body is faint.
     """
     curvature = moved.curvature
     seen = level_of(moved, constants.level_window)
@@ -57,7 +57,7 @@ def body_candidates(moved: Movement, threshold: float, constants: Constants) -> 
     strong = level[curvature > min(threshold, _STRONG_SHARE * strongest)]
     spread_levels = seen.spread(moved)
     lowest = max(_OVER_SPREAD * spread_levels, constants.candidate_share * quantile(strong, _LOW_QUANTILE))
-    if strongest < _FAINT_GATE * threshold:
+    if strongest < constants.sure_gate * threshold:
         lowest = min(lowest, _FAINT_SPREADS * spread_levels)
     standing_out = ((level > lowest) | (curvature > threshold)).astype(np.uint8)
     found = [part for part in _parts(standing_out) if cv2.minMaxLoc(curvature, part)[1] > threshold]

@@ -1,8 +1,9 @@
 """Changed area: the second, plain measure of a contact, in a few lines that anyone can check.
 
 It is the number of pixels whose change, without the background and after flat-field correction, is longer than a few
-grey levels. It takes in the halo around a contact and misses a flat centre, so it is no contact area; but it rises
-with the contact whatever the body, and where it and the contour disagree, the contour is not to be trusted.
+times the background's noise. It takes in the halo around a contact and misses a flat centre, so it is no contact area;
+but it rises with the contact whatever the body, and where it and the contour disagree, the contour is not to be
+trusted.
 """
 
 import numpy as np
@@ -13,8 +14,6 @@ from station.vision.region import Movement
 
 _PER_E_FOLD = 4.0
 """How fast the confidence falls with the logarithm by which only the contour has shrunk: to a half at 16 %."""
-_NOISES = 4.0
-"""A place has changed beyond this many standard deviations of the background's own noise."""
 
 
 def changed(moved: Movement, noise_levels: float, constants: Constants) -> Mask:
@@ -23,13 +22,13 @@ def changed(moved: Movement, noise_levels: float, constants: Constants) -> Mask:
     Args:
         moved: from `region.movement`.
         noise_levels: the change's standard deviation where nothing touches.
-        constants: the threshold.
+        constants: the threshold, in times the noise.
 
     Returns:
         Shape (height, width) at half the working size, 0 or 1.
     """
     length = moved.length * moved.flat_field
-    return (length > max(constants.changed_levels, _NOISES * noise_levels)).astype(np.uint8)
+    return (length > constants.reliable_ratio * noise_levels).astype(np.uint8)
 
 
 def agreement(contact_px: float, changed_px: float, constants: Constants) -> float:

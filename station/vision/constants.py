@@ -62,9 +62,11 @@ class Constants:
     # Detection
     curvature_blur: float = constant(5.0, "px", "smoothing before the slopes", "fit", "working")
     curvature_window: float = constant(7.5, "px", "window of the structure tensor", "fit", "working")
-    sure_gate: float = constant(2.0, "of the threshold", "from here on contact is sure", "fit")
+    sure_gate: float = constant(2.5, "of the threshold", "from here on contact is sure, below it is faint", "fit")
     wide_share: float = constant(0.3, "of the frame", "a body so large curves the gel evenly", "fit")
-    wide_levels: float = constant(6.0, "grey level", "and moves so much of it as far", "measured: drift reaches 0.5")
+    wide_levels: float = constant(
+        6.0, "grey level", "and moves so much of it as far", "measured: 4.6 untouched at JPEG 30"
+    )
     wide_threshold: float = constant(0.6, "of the threshold", "is enough for such a body", "fit")
     # Candidates
     level_window: float = constant(3.0, "px", "window of the change's level", "fit", "half")
@@ -114,7 +116,6 @@ class Constants:
     fine_on_skin: float = constant(
         0.105, "grey level/px", "fine share times curvature, from which a body without background is skin", "fit"
     )
-    fine_blur: float = constant(3.0, "px", "what is finer is noise", "fit", "half")
     coarse_blur: float = constant(12.0, "px", "what is coarser is the body's own slope", "fit", "half")
     element_random: float = constant(
         0.04, "of the strong change", "level of an element where directions are random", "fit"
@@ -138,7 +139,6 @@ class Constants:
     )
     corner_chord: float = constant(0.4, "of the extent", "the same about a corner", "fit")
     # Weak contact
-    dent_sigma: float = constant(2.5, "px", "size of the dent that is looked for, 0.27 mm", "fit", "half")
     weak_threshold: float = constant(
         6.9, "of the noise", "a touch stands out by this", "measured: none of 11,040 untouched frames"
     )
@@ -160,11 +160,12 @@ class Constants:
         0.9, "of the last area", "the next step confirms a contact that it contains", "fit"
     )
     # Witness
-    changed_levels: float = constant(4.0, "grey level", "a place has changed from here on", "fit")
     witness_most: float = constant(4.5, "of the contact area", "more changed than this is a disagreement", "fit")
     witness_least: float = constant(0.1, "of the contact area", "less changed than this is a disagreement", "fit")
     # Confidence
-    reliable_ratio: float = constant(4.0, "times the noise", "drop at which the confidence is one half", "fit")
+    reliable_ratio: float = constant(
+        4.0, "times the noise", "drop at which the confidence is one half; less is no change", "fit"
+    )
     support_least: float = constant(
         0.06, "", "confidence below which an outline is dropped", "measured: 0.05 untouched at JPEG 30"
     )

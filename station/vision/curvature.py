@@ -12,14 +12,12 @@ import numpy as np
 from station.vision.background import LEAST_BACKGROUND, Background, quantile, weighted_median
 from station.vision.constants import Constants
 from station.vision.contact import FloatImage
-from station.vision.working import product, resized
+from station.vision.working import HALF_FROM_PX, product, resized
 
 _CALMEST = 0.05
 """The share of the frame that is background for certain, before anything is known."""
 _LIMIT_FLOOR = 0.15
 """Of `least_curvature`: added to the limit, so that an image without noise has a background too."""
-_HALF_FROM_PX = 3.0
-"""As `working.HALF_FROM_PX`, of the structure tensor's window."""
 
 
 def curvature(change: FloatImage, step: int, constants: Constants) -> FloatImage:
@@ -43,7 +41,7 @@ def curvature(change: FloatImage, step: int, constants: Constants) -> FloatImage
     tensor = cv2.merge([product(a, b) for a, b in products])
     height, width = change.shape[:2]
     window = constants.curvature_window / step
-    if window > _HALF_FROM_PX:  # a wide window loses nothing at half the size, and takes a quarter of the time
+    if window > HALF_FROM_PX:  # a wide window loses nothing at half the size, and takes a quarter of the time
         tensor, window = resized(np.asarray(tensor, np.float32), (-(-width // 2), -(-height // 2))), window / 2
     xx, yy, xy = cv2.split(cv2.GaussianBlur(tensor, (0, 0), window))
     determinant = np.maximum(xx * yy - xy * xy, 0)

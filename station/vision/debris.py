@@ -12,8 +12,9 @@ import numpy.typing as npt
 from station.vision.contact import FloatImage
 from station.vision.working import NEXT_TO_NOTHING, length_squared, resized
 
-_FINE_PX, _LENGTH_PX = (1.0, 4.0), 1.5
-"""At half the working size, of the Gaussians between which a particle is, 0.1 to 0.4 mm, and of its strength."""
+_FINE_PX, _COARSE_PX, _LENGTH_PX = 1.0, 4.0, 1.5
+"""At half the working size, of the Gaussians between which a particle is, 0.1 to 0.4 mm, and of its strength. What is
+compared has the finer as its window, the filling the coarser."""
 _LEAST_LEVELS = 10.0
 """Of what is fine in the reference: without debris it reaches 6 on the twin and 8 on the real presses' reference."""
 _RING_PX, _HALO_PX = 9, 5
@@ -22,8 +23,6 @@ _LONGEST_PX = 40
 """At half the working size, about 4 mm, two particles side by side: what is longer is the edge of a beam of light."""
 _INPAINT_PX, _INPAINTED_BLUR_PX = 3, 2.0
 """At the working size: how far around a particle its surroundings are continued from, and their smoothing."""
-_COMPARED_PX, _AROUND_PX = 1.0, 4.0
-"""Windows at half the working size, as fine and as coarse as above: of what is compared, and of the filling."""
 _STEEPEST = 0.4
 """Gate over the root of the contact's area, px of half the working size. Judged contacts reach 0.38, raspberries;
 judged specks that had moved begin at 0.42: measured on 100 gels of the twin with debris, and on 220 contacts."""
@@ -40,7 +39,7 @@ class Debris:
         height, width = light.shape[:2]
         self._half = (-(-width // 2), -(-height // 2))
         half = resized(light, self._half)
-        finest, coarse = (cv2.GaussianBlur(half, (0, 0), sigma) for sigma in _FINE_PX)
+        finest, coarse = (cv2.GaussianBlur(half, (0, 0), sigma) for sigma in (_FINE_PX, _COARSE_PX))
         fine = finest - coarse
         for axis in (0, 1):
             fine -= np.median(fine, axis=axis, keepdims=True)
@@ -77,12 +76,12 @@ class Debris:
         if self._pattern is None:
             return change
         given_back = change + self._pattern
-        shown, hidden = (cv2.GaussianBlur(length_squared(one), (0, 0), _COMPARED_PX) for one in (change, given_back))
+        shown, hidden = (cv2.GaussianBlur(length_squared(one), (0, 0), _FINE_PX) for one in (change, given_back))
         is_hidden = hidden < shown
         valid = np.maximum(self.clean, is_hidden)
         known = np.where(is_hidden[..., None], given_back, change) * valid[..., None]
-        weight = np.maximum(cv2.GaussianBlur(valid, (0, 0), _AROUND_PX), NEXT_TO_NOTHING)
-        around = np.asarray(cv2.GaussianBlur(known, (0, 0), _AROUND_PX) / weight[..., None], np.float32)
+        weight = np.maximum(cv2.GaussianBlur(valid, (0, 0), _COARSE_PX), NEXT_TO_NOTHING)
+        around = np.asarray(cv2.GaussianBlur(known, (0, 0), _COARSE_PX) / weight[..., None], np.float32)
         filled = np.where(is_hidden[..., None], given_back, around)
         change[self._places] = filled[self._places]
         return change

@@ -20,7 +20,7 @@ from station.vision.contact import FloatImage, Mask
 from station.vision.contour import Rays, closed_path
 from station.vision.working import HALF_FROM_PX, NEXT_TO_NOTHING, SUBPIXEL_BITS, blurred, length_squared, resized
 
-_CHANGE_BLUR_PX = 1.0
+CHANGE_BLUR_PX = 1.0
 """At half the working size: the noise of single pixels goes, an achene of 1 mm stays."""
 _STEPS = 80
 """On a ray. Resolution: a fortieth of the radius."""
@@ -94,7 +94,7 @@ def movement(half: FloatImage, background: Background, flat_field: FloatImage, c
         flat_field: from `flat_field_correction`, shape (height, width).
         curvature: from `curvature`, shape (height, width).
     """
-    change = np.asarray(cv2.GaussianBlur(half, (0, 0), _CHANGE_BLUR_PX), np.float32)
+    change = np.asarray(cv2.GaussianBlur(half, (0, 0), CHANGE_BLUR_PX), np.float32)
     weight = resized(background.weight, (half.shape[1], half.shape[0]))
     squared = length_squared(change)
     length = np.asarray(cv2.sqrt(squared), np.float32)
@@ -234,7 +234,7 @@ def _is_skin_by_curvature(moved: Movement, halved: Movement, region: Mask, const
 def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float:
     """How much of a region's squared change is as fine as achenes are: the medians' ratio, or 0 in few pixels."""
     size = (change.shape[1], change.shape[0])
-    sigmas = (constants.fine_blur / 2, constants.coarse_blur / 2)
+    sigmas = (constants.level_window / 2, constants.coarse_blur / 2)
     elements, slopes = (np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32) for sigma in sigmas)
     inside = cv2.resize(region, size, interpolation=cv2.INTER_NEAREST) > 0
     if not inside.any():
@@ -244,9 +244,7 @@ def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float
 
 
 def has_moved_widely(moved: Movement, constants: Constants) -> bool:
-    """Whether much of the frame has moved far beyond what drift leaves over.
-
-    On real backgrounds with noise, streaks and drift the level reached there was 0.5, of balls over 85 mm² 15.
+    """Whether much of the frame has moved far beyond what drift and compression leave over.
 
     Args:
         moved: from `movement`.
@@ -308,7 +306,7 @@ def _coherence(moved: Movement, halved: Movement, region: Mask, window_px: float
     The region's mean change is taken off before: slopes point all ways, so it is light that the model left over. The
     share of the region that has moved least is left out: noise has no direction.
     """
-    window_px = max(_CHANGE_BLUR_PX, window_px)
+    window_px = max(CHANGE_BLUR_PX, window_px)
     if window_px > HALF_FROM_PX:
         moved, window_px = halved, window_px / 2
         size = (moved.change.shape[1], moved.change.shape[0])

@@ -6,12 +6,13 @@ import numpy as np
 from station.vision.background import quantile
 from station.vision.constants import Constants
 from station.vision.contact import FloatImage, Mask
+from station.vision.region import CHANGE_BLUR_PX
 
 _STRONG_QUANTILE = 0.8
 """Of a region's change: its strong part. At 0.9 the fit's cost is 0.008 to 0.015 higher, at 0.75 0.003 to 0.014."""
 _LEVELS_TRIED = (0.7, 1.4)
 """Times the level: together an octave."""
-_BLUR_PX, _GROOVE_PX, _SPECK_PX, _ROOM_PX = 1.0, 7, 5, 9
+_GROOVE_PX, _SPECK_PX, _ROOM_PX = 7, 5, 9
 """Of the smoothing, of grooves that are bridged, of specks that are dropped, and of the room around a region."""
 
 
@@ -59,7 +60,7 @@ def union(length: FloatImage, region: Mask, level: float, constants: Constants) 
     groove, speck, room = (
         cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)) for side in (_GROOVE_PX, _SPECK_PX, _ROOM_PX)
     )
-    smooth = cv2.GaussianBlur(length, (0, 0), _BLUR_PX)
+    smooth = cv2.GaussianBlur(length, (0, 0), CHANGE_BLUR_PX)
     near = np.asarray(cv2.dilate(region, room), np.uint8)
     pressed = (smooth > level).astype(np.uint8) & near
     # How much of the place a level 0.7 and one 1.4 times as high leave: twice the level, so to say.

@@ -75,7 +75,8 @@ class WeakContactDetector:
         """What the response has to reach."""
         self._most_of_fine = constants.weak_most_of_fine
         self._reference, self._lit = reference, lit.astype(np.float32)
-        sigma_px = constants.dent_sigma * min(1.0, max(height, width) / (LONG_SIDE_PX / 2))
+        # The dent that is looked for, 0.27 mm, is what the curvature's smoothing leaves of a point.
+        sigma_px = constants.curvature_blur / 2 * min(1.0, max(height, width) / (LONG_SIDE_PX / 2))
         self._reach_px = int(np.ceil(_REACH * sigma_px))
         x = np.arange(-self._reach_px, self._reach_px + 1, dtype=np.float32)
         dent = np.exp(-np.square(x / sigma_px) / 2)

@@ -29,11 +29,11 @@ def disc(levels):
     return levels / np.sqrt(3) * DISC[..., None] * np.array([1.0, -1.0, 1.0])
 
 
-def test_what_differs_by_more_than_a_few_levels_has_changed(moved):
-    found = changed(moved(disc(3 * CONSTANTS.changed_levels)), 0.0, CONSTANTS)
+def test_what_differs_by_more_than_a_few_times_the_noise_has_changed(moved):
+    found = changed(moved(disc(3 * CONSTANTS.reliable_ratio)), 1.0, CONSTANTS)
     assert set(np.unique(found)) == {0, 1}
     assert np.count_nonzero(found) == pytest.approx(np.count_nonzero(DISC), rel=0.1)
-    assert not changed(moved(disc(0.8 * CONSTANTS.changed_levels)), 0.0, CONSTANTS).any()
+    assert not changed(moved(disc(0.8 * CONSTANTS.reliable_ratio)), 1.0, CONSTANTS).any()
 
 
 def test_noise_has_not_changed(moved):
@@ -43,8 +43,8 @@ def test_noise_has_not_changed(moved):
 
 
 def test_in_weak_light_a_smaller_change_counts(moved):
-    change = disc(0.6 * CONSTANTS.changed_levels)
-    bright, dark = (np.count_nonzero(changed(moved(change, factor), 0.0, CONSTANTS)) for factor in (1.0, 2.5))
+    change = disc(0.6 * CONSTANTS.reliable_ratio)
+    bright, dark = (np.count_nonzero(changed(moved(change, factor), 1.0, CONSTANTS)) for factor in (1.0, 2.5))
     assert bright == 0
     assert dark > 0.8 * np.count_nonzero(DISC)
 

@@ -384,7 +384,7 @@ def test_the_changed_area_is_given_beside_the_contact_area(sphere_press):
 
 def test_other_constants_change_the_measurement(sphere_press):
     press = sphere_press(levels=60)
-    strict = replace(CONSTANTS, changed_levels=60.0)
+    strict = replace(CONSTANTS, reliable_ratio=60.0)
     fewer = RobustMethod([press.reference], RobustParameters(), strict).measure(press.image).changed_area_px
     more = measure(press.reference, press.image).changed_area_px
     assert fewer is not None
