@@ -110,7 +110,7 @@ def test_a_panel_has_a_keyboard_on_its_screen_and_another_browser_has_none(ready
 
 
 @pytest.mark.timeout(120)
-def test_a_phones_navigation_is_one_row_with_the_rest_behind_more(ready, panel):
+def test_a_phones_navigation_is_one_row_with_the_rest_behind_more(people, panel):
     phone = panel(width=390, height=844)
     phone.open("/maintenance")
     nav = phone.page.locator("nav.pages")

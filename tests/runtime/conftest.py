@@ -100,11 +100,11 @@ class LineClient:
         return await self.client.request(Resume(), Open, deadline_s=20)
 
     async def ready(self) -> StationState:
-        async def look() -> StationState | None:
-            state = await self.state()
-            return state if state.ready else None
-
-        return await eventually(look)
+        deadline_s = time.monotonic() + PATIENCE_S
+        while not (state := await self.state()).ready:
+            assert time.monotonic() < deadline_s, f"not ready within {PATIENCE_S} s: {state}"
+            await asyncio.sleep(0.02)
+        return state
 
     async def inspect(self) -> Outcome:
         """One fruit, from a ready station to an acknowledged outcome."""
