@@ -36,6 +36,8 @@ OUT = {
     "saturated_share": 2.0,
     "stripe_prior": 1e9,
     "support_least": 0.0,
+    "wide_levels": 1e9,
+    "wide_share": 2.0,
     "wide_threshold": 1.0,
     "recipe: edge_stiffness": 1e-9,
     "recipe: smallest_contact_px": 0.0,
