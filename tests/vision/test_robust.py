@@ -186,6 +186,16 @@ def test_a_large_soft_contact_that_curves_the_gel_little_is_whole(closing_mm):
     assert np.median(ratios(presses)) == pytest.approx(1, abs=0.15)
 
 
+@pytest.mark.parametrize("unit", [1, 9, 17])
+def test_a_firm_ball_that_leaves_little_background_is_whole_and_sure(unit):
+    """Its curvature alone reaches no threshold, but much of the frame has moved far."""
+    ball = replace(draw_fruit("rubber_ball", 0), width_mm=38.0, length_mm=38.0)
+    press = render_press(ball, unit, (6.7,), PressOptions(unit=unit))
+    contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
+    assert contact.flags == frozenset()
+    assert contact.area_px == pytest.approx(press.true_masks[0].sum() / 255, rel=0.05)
+
+
 @pytest.mark.parametrize(("kind", "closing_mm", "rel"), [("strawberry", 3.0, 0.2), ("raspberry", 4.0, 0.15)])
 def test_a_bruised_fruit_over_half_of_the_field_is_whole(kind, closing_mm, rel):
     presses = [render_press(draw_fruit(kind, seed, bruised=True), seed, (closing_mm,)) for seed in range(900, 905)]
