@@ -200,6 +200,8 @@ class RegisterLink:
         return response.registers
 
     async def _ask(self, what: str, request: Any) -> ModbusPDU:
+        task = asyncio.current_task()
+        cancelled_before = task.cancelling() if task else 0
         try:
             async with self._turn:
                 response: ModbusPDU = await request()
@@ -208,6 +210,10 @@ class RegisterLink:
                 f"{self._where} did not answer when asked to {what} ({error}): connect again and look at the result "
                 "registers before the next trigger"
             ) from error
+        # `asyncio.wait_for` of Python 3.11, by which pymodbus waits, loses a cancellation that comes with the answer:
+        # a heartbeat went on after it, and `close` waited for its end for ever.
+        if task and task.cancelling() > cancelled_before:
+            raise asyncio.CancelledError
         if response.isError():
             code = response.exception_code
             why = EXCEPTIONS.get(code, "see its log")

@@ -17,7 +17,6 @@ from plc_interface.client.inspection_result import InspectionResult, published_r
 from plc_interface.client.register_link import RegisterLink
 from plc_interface.registers.alarms import active_alarms
 from plc_interface.registers.bits import WRITE_KEY
-from plc_interface.registers.codec import WordOrder
 from plc_interface.registers.map import BY_NAME, COUNTERS
 from station.channel.line import CommandName
 
@@ -34,19 +33,8 @@ class StationClient(RegisterLink):
     As a context manager it connects and checks the references; writing begins with `arm`.
     """
 
-    def __init__(
-        self,
-        host: str,
-        port: int = 5020,
-        *,
-        unit: int = 1,
-        order: WordOrder = WordOrder.HIGH_FIRST,
-        timeout_s: float = 1.0,
-    ) -> None:
-        """As `RegisterLink`."""
-        super().__init__(host, port, unit=unit, order=order, timeout_s=timeout_s)
-        self._control: frozenset[str] = frozenset()
-        self._beating: asyncio.Task[None] | None = None
+    _control: frozenset[str] = frozenset()
+    _beating: asyncio.Task[None] | None = None
 
     async def close(self) -> None:
         """Stop the heartbeat and close the connection. Idempotent; the station disarms, results are kept."""
@@ -160,15 +148,11 @@ class StationClient(RegisterLink):
         if now["result_sequence"] != sequence:
             raise NotReadyError(f"result {sequence} is not the one shown, which is {now['result_sequence'] or 'none'}")
         await self.write({"acknowledged_sequence": sequence})
-        await self._raise("acknowledge")
-        try:
-            await self._until(
-                lambda now: now["acknowledged_sequence_echo"] == sequence,
-                time.monotonic() + ANSWER_DEADLINE_S,
-                f"the acknowledgement of result {sequence}",
-            )
-        finally:
-            await self._set(self._control)
+        await self._until_raised(
+            "acknowledge",
+            lambda now: now["acknowledged_sequence_echo"] == sequence,
+            f"the acknowledgement of result {sequence}",
+        )
 
     async def command(self, command: CommandName, argument: int = 0, deadline_s: float = 40.0) -> None:
         """Send a command to the station, and wait until it is done.
@@ -180,18 +164,15 @@ class StationClient(RegisterLink):
         sequence = (await self.read("command_sequence_echo")) % 65_535 + 1
         code = BY_NAME["command_code"].code(command.value)
         await self.write({"command_code": code, "command_argument": argument, "command_sequence": sequence})
-        await self._raise("execute_command")
-        try:
-            ended = await self._until(
-                lambda now: (
-                    now["command_sequence_echo"] == sequence
-                    and bool({"command_done", "command_failed"} & STATUS.names(now["status"]))
-                ),
-                time.monotonic() + deadline_s,
-                f"the command {command.value}",
-            )
-        finally:
-            await self._set(self._control)
+        ended = await self._until_raised(
+            "execute_command",
+            lambda now: (
+                now["command_sequence_echo"] == sequence
+                and bool({"command_done", "command_failed"} & STATUS.names(now["status"]))
+            ),
+            f"the command {command.value}",
+            deadline_s,
+        )
         result = BY_NAME["command_result"].codes[ended["command_result"]]
         if result.name != "done":
             raise CommandFailedError(f"{command.value} {argument} was not carried out: {result.meaning}", result.name)
@@ -211,15 +192,11 @@ class StationClient(RegisterLink):
             DeadlineMissedError: the station did not accept it in time.
         """
         await self.write({"lot": lot})
-        await self._raise("latch_lot")
-        try:
-            await self._until(
-                lambda now: "lot_latched" in STATUS.names(now["status"]),
-                time.monotonic() + ANSWER_DEADLINE_S,
-                f"the lot {lot!r} to be latched",
-            )
-        finally:
-            await self._set(self._control)
+        await self._until_raised(
+            "latch_lot",
+            lambda now: "lot_latched" in STATUS.names(now["status"]),
+            f"the lot {lot!r} to be latched",
+        )
 
     async def counters(self) -> dict[str, int]:
         """Return the counters by register name, from one read."""
@@ -245,9 +222,15 @@ class StationClient(RegisterLink):
         await self.write({"control": CONTROL.flags(control)})
         self._control = control
 
-    async def _raise(self, bit: str) -> None:
-        """Set one more control bit, which the next `_set` clears."""
+    async def _until_raised(
+        self, bit: str, holds: Callable[[dict[str, Any]], bool], what: str, limit_s: float = ANSWER_DEADLINE_S
+    ) -> dict[str, Any]:
+        """Set one more control bit until a scan meets a condition, and return that scan."""
         await self.write({"control": CONTROL.flags(self._control | {bit})})
+        try:
+            return await self._until(holds, time.monotonic() + limit_s, what)
+        finally:
+            await self._set(self._control)
 
     async def _until(self, holds: Callable[[dict[str, Any]], bool], ends_s: float, what: str) -> dict[str, Any]:
         """Return the first scan that meets a condition."""

@@ -8,7 +8,12 @@ from station.messages.message import Message
 
 
 @dataclass(frozen=True, slots=True)
-class SaveJournal:
+class Action:
+    """Base of all actions."""
+
+
+@dataclass(frozen=True, slots=True)
+class SaveJournal(Action):
     """Write the journal before the PLC sees the new registers."""
 
     journal: Journal
@@ -17,7 +22,7 @@ class SaveJournal:
 
 
 @dataclass(frozen=True, slots=True)
-class RequestBegin:
+class RequestBegin(Action):
     """Send `Begin`; answer with BeginAnswered or BeginFailed."""
 
     number: int
@@ -29,7 +34,7 @@ class RequestBegin:
 
 
 @dataclass(frozen=True, slots=True)
-class RequestOutcome:
+class RequestOutcome(Action):
     """Send `AwaitOutcome`; answer with OutcomeReceived or RequestFailed."""
 
     sequence: int
@@ -37,14 +42,14 @@ class RequestOutcome:
 
 
 @dataclass(frozen=True, slots=True)
-class RequestOpen:
+class RequestOpen(Action):
     """Send `Resume`; answer with OpenAnswered or RequestFailed."""
 
     number: int
 
 
 @dataclass(frozen=True, slots=True)
-class RequestCommand:
+class RequestCommand(Action):
     """Send `Command`; answer with CommandAnswered or CommandFailed."""
 
     number: int
@@ -53,48 +58,33 @@ class RequestCommand:
 
 
 @dataclass(frozen=True, slots=True)
-class NotifyPublished:
+class NotifyPublished(Action):
     """Send `Published` after earlier notes; answer with OutcomeNoted or RequestFailed."""
 
     outcome: Outcome
 
 
 @dataclass(frozen=True, slots=True)
-class NotifyAcknowledged:
+class NotifyAcknowledged(Action):
     """Send `Acknowledged` after earlier notes; a failure is answered with RequestFailed."""
 
     sequence: int
 
 
 @dataclass(frozen=True, slots=True)
-class ForwardOutcome:
+class ForwardOutcome(Action):
     """Give a new outcome to the line's outputs."""
 
     outcome: Outcome
 
 
-@dataclass(frozen=True, slots=True)
-class ClearFaults:
+class ClearFaults(Action):
     """Clear the faults of the line's outputs."""
 
 
 @dataclass(frozen=True, slots=True)
-class Log:
+class Log(Action):
     """Write one line into the log."""
 
     text: Message | str
     warning: bool = True
-
-
-Action = (
-    SaveJournal
-    | RequestBegin
-    | RequestOutcome
-    | RequestOpen
-    | RequestCommand
-    | NotifyPublished
-    | NotifyAcknowledged
-    | ForwardOutcome
-    | ClearFaults
-    | Log
-)

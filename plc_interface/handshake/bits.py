@@ -3,48 +3,23 @@
 from plc_interface.handshake.actions import ClearFaults
 from plc_interface.handshake.modes import Arming, Lot, Service, Signal
 from plc_interface.handshake.state import COUNTERS, Fault
-from plc_interface.handshake.work import Row, Work, row
+from plc_interface.handshake.work import Row, Work, described, row
 
-
-def silent(work: Work) -> None:
-    """Fault: PLC's heartbeat lost."""
-    work.fault(Fault.PLC_SILENT)
-
-
-def writer_lost(work: Work) -> None:
-    """Fault: writer lost."""
-    work.fault(Fault.WRITER_LOST)
-
-
-def count_loss(work: Work) -> None:
-    """Count the loss of communication."""
-    work.count("count_communication")
-
-
-def lot_is_good(work: Work) -> bool:
-    """The lot id is printable ASCII."""
-    return work.state.inputs.lot is not None
+silent = described("Fault: PLC's heartbeat lost.", lambda work: work.fault(Fault.PLC_SILENT))
+writer_lost = described("Fault: writer lost.", lambda work: work.fault(Fault.WRITER_LOST))
+count_loss = described("Count the loss of communication.", lambda work: work.count("count_communication"))
+lot_is_good = described("The lot id is printable ASCII.", lambda work: work.state.inputs.lot is not None)
 
 
 def latch(work: Work) -> None:
     """Accept the lot id, start the latch bit's time-out."""
     work.update_journal(lot=work.state.inputs.lot or "")
-    work.start(Signal.LATCH_TIMEOUT, work.settings.handshake_timeout_s)
+    work.watch_bit(Signal.LATCH_TIMEOUT)
 
 
-def end_latch(work: Work) -> None:
-    """Stop the time-out."""
-    work.stop(Signal.LATCH_TIMEOUT)
-
-
-def bad_lot(work: Work) -> None:
-    """Fault: bad lot id."""
-    work.fault(Fault.BAD_LOT)
-
-
-def latch_not_reset(work: Work) -> None:
-    """Fault: latch bit not reset in time."""
-    work.fault(Fault.LATCH_NOT_RESET)
+end_latch = described("Stop the time-out.", lambda work: work.stop(Signal.LATCH_TIMEOUT))
+bad_lot = described("Fault: bad lot id.", lambda work: work.fault(Fault.BAD_LOT))
+latch_not_reset = described("Fault: latch bit not reset in time.", lambda work: work.fault(Fault.LATCH_NOT_RESET))
 
 
 def clear(work: Work) -> None:

@@ -4,7 +4,7 @@ from plc_interface.handshake.actions import RequestCommand
 from plc_interface.handshake.journal import COMMAND_RESULT
 from plc_interface.handshake.modes import Command, Link, Signal
 from plc_interface.handshake.state import Fault
-from plc_interface.handshake.work import Effect, Row, Work, row
+from plc_interface.handshake.work import Effect, Row, Work, described, row
 from plc_interface.registers.map import BY_NAME
 from station.channel.line import CommandName
 
@@ -26,19 +26,11 @@ def is_no_command(work: Work) -> bool:
     return work.state.inputs.command_code not in _CODES or work.state.inputs.command_code == 0
 
 
-def station_is_lost(work: Work) -> bool:
-    """The station is lost."""
-    return work.state.link is not Link.UP
-
-
-def bit_is_high(work: Work) -> bool:
-    """The bit is high."""
-    return "execute_command" in (work.state.seen or ())
-
-
-def note_sequence(work: Work) -> None:
-    """Echo the sequence."""
-    work.update_journal(command_sequence=work.state.inputs.command_sequence)
+station_is_lost = described("The station is lost.", lambda work: work.state.link is not Link.UP)
+bit_is_high = described("The bit is high.", lambda work: "execute_command" in (work.state.seen or ()))
+note_sequence = described(
+    "Echo the sequence.", lambda work: work.update_journal(command_sequence=work.state.inputs.command_sequence)
+)
 
 
 def request(work: Work) -> None:
@@ -58,28 +50,13 @@ def result(name: str) -> Effect:
         if name != "executing":
             work.state.command_request = None
 
-    note.__doc__ = f"Result {name}."
-    return note
+    return described(f"Result {name}.", note)
 
 
-def watch(work: Work) -> None:
-    """Start the execute bit's time-out."""
-    work.start(Signal.EXECUTE_TIMEOUT, work.settings.handshake_timeout_s)
-
-
-def end_watch(work: Work) -> None:
-    """Stop the time-out."""
-    work.stop(Signal.EXECUTE_TIMEOUT)
-
-
-def not_reset(work: Work) -> None:
-    """Fault: execute bit not reset in time."""
-    work.fault(Fault.EXECUTE_NOT_RESET)
-
-
-def busy(work: Work) -> None:
-    """Fault: command while another one is executed."""
-    work.fault(Fault.COMMAND_BUSY)
+watch = described("Start the execute bit's time-out.", lambda work: work.watch_bit(Signal.EXECUTE_TIMEOUT))
+end_watch = described("Stop the time-out.", lambda work: work.stop(Signal.EXECUTE_TIMEOUT))
+not_reset = described("Fault: execute bit not reset in time.", lambda work: work.fault(Fault.EXECUTE_NOT_RESET))
+busy = described("Fault: command while another one is executed.", lambda work: work.fault(Fault.COMMAND_BUSY))
 
 
 IDLE, EXECUTING, DONE, FAILED = Command.IDLE, Command.EXECUTING, Command.DONE, Command.FAILED

@@ -35,152 +35,115 @@ class Inputs:
 
 
 @dataclass(frozen=True, slots=True)
-class PlcWrote:
-    """The writer wrote into the control block; the named registers hold new values, or the same again."""
+class Event:
+    """Base of all events."""
 
     at: Moment
+
+
+@dataclass(frozen=True, slots=True)
+class PlcWrote(Event):
+    """The writer wrote into the control block; the named registers hold new values, or the same again."""
+
     inputs: Inputs
     written: frozenset[str]
 
 
-@dataclass(frozen=True, slots=True)
-class WriterGranted:
+class WriterGranted(Event):
     """A client got the right to write."""
 
-    at: Moment
 
-
-@dataclass(frozen=True, slots=True)
-class WriterWithdrawn:
+class WriterWithdrawn(Event):
     """The client with the right to write closed, died, or released it."""
 
-    at: Moment
 
-
-@dataclass(frozen=True, slots=True)
-class Tick:
+class Tick(Event):
     """Only time has passed."""
 
-    at: Moment
-
 
 @dataclass(frozen=True, slots=True)
-class Beat:
+class Beat(Event):
     """The station answered a beat."""
 
-    at: Moment
     station: StationState
 
 
 @dataclass(frozen=True, slots=True)
-class OutputChanged:
+class OutputChanged(Event):
     """The line's output can, or cannot, divert a fruit now."""
 
-    at: Moment
     ready: bool
 
 
 @dataclass(frozen=True, slots=True)
-class BeginAnswered:
+class BeginAnswered(Event):
     """The station's answer to `RequestBegin` with this number."""
 
-    at: Moment
     number: int
     begun: BeginReply
 
 
 @dataclass(frozen=True, slots=True)
-class BeginFailed:
+class BeginFailed(Event):
     """`RequestBegin` got no answer; whether it was carried out is unknown."""
 
-    at: Moment
     number: int
 
 
 @dataclass(frozen=True, slots=True)
-class OutcomeReceived:
+class OutcomeReceived(Event):
     """An inspection's outcome."""
 
-    at: Moment
     outcome: Outcome
 
 
 @dataclass(frozen=True, slots=True)
-class OutcomeFailed:
+class OutcomeFailed(Event):
     """`RequestOutcome` got no answer, or an unusable one."""
 
-    at: Moment
     sequence: int
     what: str
     """For the log."""
 
 
-@dataclass(frozen=True, slots=True)
-class ShuttingDown:
+class ShuttingDown(Event):
     """This process ends: it reports offline to the PLC, and begins nothing any more."""
 
-    at: Moment
-
 
 @dataclass(frozen=True, slots=True)
-class RequestFailed:
+class RequestFailed(Event):
     """Another request got no answer, or an unusable one."""
 
-    at: Moment
     what: str
     """For the log."""
 
 
 @dataclass(frozen=True, slots=True)
-class OpenAnswered:
+class OpenAnswered(Event):
     """The station's answer to `RequestOpen` with this number."""
 
-    at: Moment
     number: int
     opened: Open
 
 
 @dataclass(frozen=True, slots=True)
-class OutcomeNoted:
+class OutcomeNoted(Event):
     """The station has durably stored the outcome published under this sequence."""
 
-    at: Moment
     sequence: int
 
 
 @dataclass(frozen=True, slots=True)
-class CommandAnswered:
+class CommandAnswered(Event):
     """The station's answer to `RequestCommand` with this number."""
 
-    at: Moment
     number: int
     done: bool
     why: str
 
 
 @dataclass(frozen=True, slots=True)
-class CommandFailed:
+class CommandFailed(Event):
     """`RequestCommand` got no answer in time; whether it was carried out is unknown."""
 
-    at: Moment
     number: int
-
-
-Event = (
-    PlcWrote
-    | WriterGranted
-    | WriterWithdrawn
-    | Tick
-    | Beat
-    | OutputChanged
-    | BeginAnswered
-    | BeginFailed
-    | OutcomeReceived
-    | OutcomeFailed
-    | RequestFailed
-    | OpenAnswered
-    | OutcomeNoted
-    | CommandAnswered
-    | CommandFailed
-    | ShuttingDown
-)

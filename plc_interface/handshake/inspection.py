@@ -8,7 +8,7 @@ from plc_interface.handshake.journal import Running
 from plc_interface.handshake.modes import Inspection, Signal
 from plc_interface.handshake.outcomes import is_sound, no_result, publish_if_other, publish_own, queue
 from plc_interface.handshake.trigger import note_refusal
-from plc_interface.handshake.work import Work, row
+from plc_interface.handshake.work import Work, described, row
 from station.channel.line import BeginReply, Reason, Refusal, StationState
 
 
@@ -45,6 +45,8 @@ def run(work: Work, sequence: int, pending: RequestBegin, deadline_s: float) -> 
     within_s = deadline_s + work.settings.result_margin_s
     state.pending = None
     state.running = running(pending, sequence, work.at, within_s, station)
+    if state.taken == sequence:
+        state.taken = 0  # what runs has no outcome yet: the PLC's number was wrong, or of another station
     work.update_journal(accepted_id=pending.trigger_id, highest=sequence)
     work.start(Signal.RESULT_DEADLINE, within_s)
     work.actions.append(RequestOutcome(sequence, within_s))
@@ -131,8 +133,7 @@ def _ending(words: str, *reasons: Reason) -> Callable[[Work], None]:
             work.log(f"inspection {running.sequence}: NO_RESULT ({', '.join(reasons)})")
             publish_own(work, no_result(running, work.at, *reasons))
 
-    give_no_result.__doc__ = words
-    return give_no_result
+    return described(words, give_no_result)
 
 
 late = _ending("NO_RESULT (late) stands, `Published`.", Reason.LATE)

@@ -4,12 +4,9 @@ from plc_interface.handshake.actions import RequestOpen
 from plc_interface.handshake.events import Beat
 from plc_interface.handshake.modes import Link, Signal
 from plc_interface.handshake.resynchronisation import resynchronise
-from plc_interface.handshake.work import Work, row
+from plc_interface.handshake.work import Work, described, row
 
-
-def none_is_pending(work: Work) -> bool:
-    """`Resume` is not pending."""
-    return work.state.open_request is None
+none_is_pending = described("`Resume` is not pending.", lambda work: work.state.open_request is None)
 
 
 def store_state(work: Work) -> None:

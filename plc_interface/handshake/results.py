@@ -3,7 +3,7 @@
 from plc_interface.handshake.modes import Result, Signal
 from plc_interface.handshake.outcomes import acknowledge, pass_over_hidden
 from plc_interface.handshake.state import Fault
-from plc_interface.handshake.work import Work, row
+from plc_interface.handshake.work import Work, described, row
 
 
 def bit_is_high(work: Work) -> bool:
@@ -11,14 +11,8 @@ def bit_is_high(work: Work) -> bool:
     return "acknowledge" in (work.state.seen or ()) and not work.state.acknowledge_stuck
 
 
-def another_waits(work: Work) -> bool:
-    """Another result waits."""
-    return len(work.state.queue) > 1
-
-
-def one_waits(work: Work) -> bool:
-    """A result waits."""
-    return bool(work.state.queue)
+another_waits = described("Another result waits.", lambda work: len(work.state.queue) > 1)
+one_waits = described("A result waits.", lambda work: bool(work.state.queue))
 
 
 def publish_oldest(work: Work) -> None:
@@ -52,14 +46,8 @@ def take_unwritten(work: Work, sequence: int) -> None:
         pass_over_hidden(work)
 
 
-def watch(work: Work) -> None:
-    """Start the acknowledge bit's time-out."""
-    work.start(Signal.ACKNOWLEDGE_TIMEOUT, work.settings.handshake_timeout_s)
-
-
-def end_watch(work: Work) -> None:
-    """Stop the time-out."""
-    work.stop(Signal.ACKNOWLEDGE_TIMEOUT)
+watch = described("Start the acknowledge bit's time-out.", lambda work: work.watch_bit(Signal.ACKNOWLEDGE_TIMEOUT))
+end_watch = described("Stop the time-out.", lambda work: work.stop(Signal.ACKNOWLEDGE_TIMEOUT))
 
 
 def enable_bit(work: Work) -> None:
@@ -73,9 +61,7 @@ def not_reset(work: Work) -> None:
     work.fault(Fault.ACKNOWLEDGE_NOT_RESET)
 
 
-def wrong(work: Work) -> None:
-    """Fault: wrong acknowledgement."""
-    work.fault(Fault.WRONG_ACKNOWLEDGEMENT)
+wrong = described("Fault: wrong acknowledgement.", lambda work: work.fault(Fault.WRONG_ACKNOWLEDGEMENT))
 
 
 WITHHELD, EMPTY, PUBLISHED, TAKEN = Result.WITHHELD, Result.EMPTY, Result.PUBLISHED, Result.TAKEN

@@ -2,7 +2,7 @@
 
 from plc_interface.handshake.modes import Arming, Command, Inspection, Link, Service, Signal, Trigger
 from plc_interface.handshake.state import Fault, State
-from plc_interface.handshake.work import Work, row
+from plc_interface.handshake.work import Work, described, row
 from station.channel.line import Refusal
 
 
@@ -31,14 +31,8 @@ def refusal(state: State) -> Refusal | None:
     return obstacle(state)
 
 
-def is_unobstructed(work: Work) -> bool:
-    """Nothing blocks the trigger."""
-    return refusal(work.state) is None
-
-
-def begin(work: Work) -> None:
-    """Request an inspection."""
-    work.signals.append(Signal.BEGIN)
+is_unobstructed = described("Nothing blocks the trigger.", lambda work: refusal(work.state) is None)
+begin = described("Request an inspection.", lambda work: work.signals.append(Signal.BEGIN))
 
 
 def note_refusal(work: Work, reason: Refusal, trigger_id: int) -> None:
@@ -57,19 +51,9 @@ def refuse(work: Work) -> None:
     note_refusal(work, refusal(work.state) or Refusal.NOT_READY, work.state.inputs.trigger_id)
 
 
-def watch(work: Work) -> None:
-    """Start the trigger's time-out."""
-    work.start(Signal.TRIGGER_TIMEOUT, work.settings.handshake_timeout_s)
-
-
-def end_watch(work: Work) -> None:
-    """Stop the trigger's time-out."""
-    work.stop(Signal.TRIGGER_TIMEOUT)
-
-
-def not_reset(work: Work) -> None:
-    """Fault: trigger bit not reset in time."""
-    work.fault(Fault.TRIGGER_NOT_RESET)
+watch = described("Start the trigger's time-out.", lambda work: work.watch_bit(Signal.TRIGGER_TIMEOUT))
+end_watch = described("Stop the trigger's time-out.", lambda work: work.stop(Signal.TRIGGER_TIMEOUT))
+not_reset = described("Fault: trigger bit not reset in time.", lambda work: work.fault(Fault.TRIGGER_NOT_RESET))
 
 
 ROWS = (

@@ -8,9 +8,8 @@ from plc_interface.handshake.state import State
 from plc_interface.handshake.trigger import obstacle
 from plc_interface.registers.alarms import alarm_values
 from plc_interface.registers.map import BY_NAME
+from plc_interface.registers.register import Value
 from station.channel.line import PACKML_STATE_NUMBERS, Line, LineFault, Outcome, StationState
-
-Value = int | float | str | None
 
 STATION_LOST_CODE = 1000
 """In `error_code` while the station does not answer; its alarms have the numbers below."""

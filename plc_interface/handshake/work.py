@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from plc_interface.handshake.actions import Action, Log
 from plc_interface.handshake.events import Event, Moment
@@ -57,6 +57,10 @@ class Work:
         """Start or restart a timer."""
         self.state.timers = {**self.state.timers, timer: self.at.s + after_s}
 
+    def watch_bit(self, timer: Signal) -> None:
+        """Start the time-out of a bit of the handshake."""
+        self.start(timer, self.settings.handshake_timeout_s)
+
     def stop(self, timer: Signal) -> None:
         """Stop a timer. Idempotent."""
         self.state.timers = {name: due_s for name, due_s in self.state.timers.items() if name != timer}
@@ -71,6 +75,13 @@ Guard = Callable[[Work], bool]
 """Its docstring is its condition in the printed table."""
 Effect = Callable[[Work], None]
 """Its docstring is its line in the printed table."""
+ResultT = TypeVar("ResultT")
+
+
+def described(words: str, rule: Callable[[Work], ResultT]) -> Callable[[Work], ResultT]:
+    """Return a guard or effect of one expression, with these words as its docstring."""
+    rule.__doc__ = words
+    return rule
 
 
 class Row(NamedTuple):

@@ -1,6 +1,7 @@
 """The client against the real server and handshake, and against servers that are not what it takes them for."""
 
 import asyncio
+import contextlib
 import zlib
 
 import pytest
@@ -351,5 +352,28 @@ def test_a_torn_result_is_never_returned(serve, copy):
             rig.image.commit = lambda values: commit({**values, copy: 3} if values.get(copy) else values)
             with pytest.raises(DeadlineMissedError):
                 await client.inspect(7, deadline_s=1.0)
+
+    asyncio.run(main())
+
+
+def test_a_client_closes_also_where_pymodbus_loses_the_end_of_its_heartbeat(serve):
+    """As `asyncio.wait_for` of Python 3.11 does with a cancellation that comes with the answer."""
+
+    async def main():
+        async with serve() as rig, StationClient(HOST, rig.port) as client:
+            answered, write = asyncio.Event(), client._client.write_registers
+
+            async def losing(*arguments, **options):
+                answer = await write(*arguments, **options)
+                answered.set()
+                with contextlib.suppress(asyncio.CancelledError):
+                    await asyncio.sleep(0.5)
+                return answer
+
+            await client.arm()
+            client._client.write_registers = losing
+            await answered.wait()
+            async with asyncio.timeout(20):
+                await client.close()
 
     asyncio.run(main())
