@@ -4,12 +4,9 @@ from station.messages.message import Message, verbatim
 
 
 class StationError(Exception):
-    """A failure with a message: what is wrong, what it means, what to do.
+    """A failure with a message: what is wrong, what it means, what to do; words instead are read in English everywhere.
 
     The command line shows the message alone and ends with exit code 1.
-
-    Args:
-        message: a defined one; words are kept as they are, and read in English everywhere.
     """
 
     exit_code = 1

@@ -35,7 +35,8 @@ def make_backup(layout: Layout, release: Path, kind: str) -> Path:
     names = (f"{kind}{stamp}{'' if number == 1 else f'-{number}'}" for number in itertools.count(1))
     copy = next(path for name in names if not (path := layout.backups / name).exists())
     partial = layout.backups / f".{copy.name}.partial"
-    _clear_partial(layout.backups)
+    for left in layout.backups.glob(".*.partial"):
+        shutil.rmtree(left, ignore_errors=True)
     partial.mkdir(mode=0o750)
     own(layout, partial, "fruit-station", "fruit-station")
     if (layout.home / RECORDS / _DATABASE).exists():
@@ -49,12 +50,7 @@ def make_backup(layout: Layout, release: Path, kind: str) -> Path:
 
 
 def prune(layout: Layout, kind: str, keep: int) -> None:
-    """Remove all backups of a kind but the newest.
-
-    Args:
-        kind: as for `make_backup`.
-        keep: number of remaining ones.
-    """
+    """Remove the backups of a kind, as for `make_backup`, that are older than so many newest ones."""
     found = sorted(path for path in layout.backups.glob(f"{kind}*") if path.is_dir())
     for path in found[: max(0, len(found) - keep)]:
         shutil.rmtree(path)
@@ -62,11 +58,7 @@ def prune(layout: Layout, kind: str, keep: int) -> None:
 
 
 def schema_version(folder: Path) -> str:
-    """Return the schema version of a records' database, as its migrations name it; empty for none.
-
-    Args:
-        folder: of the records, or of their backup.
-    """
+    """Return a records' or backup's schema version, as its migrations name it; empty for none."""
     if not (folder / _DATABASE).exists():
         return ""
     with contextlib.closing(sqlite3.connect(folder / _DATABASE)) as connection:
@@ -86,8 +78,3 @@ def _copied_file(path: Path | str, to: Path | str) -> None:
     """Copy a file, unless it has been removed meanwhile: the station writes files under temporary names."""
     with contextlib.suppress(FileNotFoundError):
         shutil.copy2(path, to)
-
-
-def _clear_partial(folder: Path) -> None:
-    for path in folder.glob(".*.partial"):
-        shutil.rmtree(path, ignore_errors=True)

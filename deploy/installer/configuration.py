@@ -10,13 +10,7 @@ from installer.programs import run
 
 
 def try_with(layout: Layout, release: Path) -> tuple[str, ...]:
-    """Check on a copy whether the configuration is valid in a release.
-
-    Args:
-        release: the next one.
-
-    Returns:
-        The necessary changes of the file.
+    """Check on a copy whether the configuration is valid in the next release; return the changes that it needs.
 
     Raises:
         Refused: it is invalid; with all problems.

@@ -24,13 +24,7 @@ class Step(NamedTuple):
 
 
 class Installation:
-    """One run of the installer.
-
-    Args:
-        services: of the same system.
-        packages: source of the packages.
-        limit_s: time for the station to become healthy.
-    """
+    """One run of the installer; the station has `limit_s` to become healthy."""
 
     def __init__(
         self, layout: Layout, services: Services, source: Source, packages: Packages, limit_s: float = LIMIT_S
@@ -48,10 +42,7 @@ class Installation:
         return self._old is not None and self._old != self.release and complete(self._old)
 
     def check(self, *, during_lot: bool) -> None:
-        """Check that it can be done.
-
-        Args:
-            during_lot: whether it may be done during a lot.
+        """Check that it can be done, and during a lot only where that is allowed.
 
         Raises:
             Refused: it cannot be done.
@@ -69,15 +60,18 @@ class Installation:
         upgrading = [
             Step(f"see whether {layout.configuration} is good for {name}", self._try_configuration),
             Step(f"copy records, state and configuration to {layout.backups}", self._make_backup),
-            Step("end the running station in order", self._stop),
-            Step(f"bring {layout.configuration} into the words of {name}", self._migrate),
+            Step("end the running station in order", self._services.stop),
+            Step(
+                f"bring {layout.configuration} into the words of {name}",
+                lambda: configuration.migrate(layout, self.release),
+            ),
         ]
         return [
             Step(f"make the release {name} in {layout.releases}", self._make),
             *(upgrading if self.is_upgrade else []),
-            Step("put units, rules and the command `station` in place", self._put),
+            Step("put units, rules and the command `station` in place", lambda: site_files.put(layout, self.release)),
             Step(f"make the user, {layout.settings}, {layout.home} and {layout.backups}", self._make_places),
-            Step(f"have {layout.current} lead to {name}", self._switch),
+            Step(f"have {layout.current} lead to {name}", lambda: point(layout.current, self.release)),
             Step("start the station now and at each boot, and wait until it is well", self._start),
             Step("remove releases that are neither in use nor the one before", self._remove_old),
         ]
@@ -92,7 +86,7 @@ class Installation:
         under_way = False
         for step in self.steps():
             print_progress(step.sentence)
-            under_way |= self.is_upgrade and step.do == self._stop
+            under_way |= self.is_upgrade and step.do == self._services.stop
             try:
                 step.do()
                 under_way &= step.do != self._start
@@ -101,12 +95,8 @@ class Installation:
                     raise
                 print_progress(str(error))
                 roll_back(self._layout, self._services, self._limit_s)
-                raise Failed(
-                    f"{self.release.name} is not in use: {self._describe_old()} is again; correct the cause"
-                ) from error
-
-    def _describe_old(self) -> str:
-        return self._old.name if self._old else "nothing"
+                old = self._old.name if self._old else "nothing"
+                raise Failed(f"{self.release.name} is not in use: {old} is again; correct the cause") from error
 
     def _make(self) -> None:
         site_files.make_folder(self._layout, self._layout.program)
@@ -128,21 +118,9 @@ class Installation:
         write_note(self._layout.upgrade, {**note, "copy": copy.name, "configuration": text})
         point(self._layout.previous, self._old)
 
-    def _stop(self) -> None:
-        self._services.stop()
-
-    def _migrate(self) -> None:
-        configuration.migrate(self._layout, self.release)
-
-    def _put(self) -> None:
-        site_files.put(self._layout, self.release)
-
     def _make_places(self) -> None:
         self._services.make_user()
         site_files.make_folders(self._layout, self._source.folder / "recipes")
-
-    def _switch(self) -> None:
-        point(self._layout.current, self.release)
 
     def _start(self) -> None:
         self._services.reload()

@@ -2,7 +2,6 @@
 
 import json
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,88 +10,41 @@ UNIT = f"{NAME}.service"
 TIMER = f"{NAME}-backup.timer"
 
 
-@dataclass(frozen=True, slots=True)
 class Layout:
-    """Paths of one installation.
+    """Paths of one installation, below `/` or a scratch root."""
 
-    Args:
-        root: `/`, or a scratch root.
-    """
-
-    root: Path
-
-    @property
-    def is_system(self) -> bool:
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.is_system = root == Path("/")
         """True for the running system, False for a scratch root."""
-        return self.root == Path("/")
+        self.program = self.place(f"/opt/{NAME}")
+        """The installed releases, and the installer's notes of them."""
+        self.releases = self.program / "releases"
+        """A folder for each release."""
+        self.current = self.program / "current"
+        """A link to the release in use."""
+        self.previous = self.program / "previous"
+        """A link to the release before it, for a rollback."""
+        self.manifest = self.program / "installed.json"
+        """Note of the files and folders outside `program` that belong to the installer."""
+        self.upgrade = self.program / "upgrade.json"
+        """Note of the release before the last upgrade, and its backup."""
+        self.settings = self.place(f"/etc/{NAME}")
+        """The site's configuration and certificates."""
+        self.configuration = self.settings / "station.yaml"
+        """The configuration's file."""
+        self.home = self.place(f"/var/lib/{NAME}")
+        """The station's state."""
+        self.recipes = self.home / "recipes"
+        """The site's recipes, which the pages edit."""
+        self.backups = self.place(f"/var/backups/{NAME}")
+        """Backups of records, state and configuration."""
+        self.cache = self.place(f"/var/cache/{NAME}")
+        """Data that may be lost."""
 
     def place(self, path: str) -> Path:
-        """Return a path of the system, below the root.
-
-        Args:
-            path: absolute, as the system has it.
-        """
+        """Return an absolute path of the system, below the root."""
         return self.root / path.lstrip("/")
-
-    @property
-    def program(self) -> Path:
-        """The installed releases, and the installer's notes of them."""
-        return self.place(f"/opt/{NAME}")
-
-    @property
-    def releases(self) -> Path:
-        """A folder for each release."""
-        return self.program / "releases"
-
-    @property
-    def current(self) -> Path:
-        """A link to the release in use."""
-        return self.program / "current"
-
-    @property
-    def previous(self) -> Path:
-        """A link to the release before it, for a rollback."""
-        return self.program / "previous"
-
-    @property
-    def manifest(self) -> Path:
-        """Note of the files and folders outside `program` that belong to the installer."""
-        return self.program / "installed.json"
-
-    @property
-    def upgrade(self) -> Path:
-        """Note of the release before the last upgrade, and its backup."""
-        return self.program / "upgrade.json"
-
-    @property
-    def settings(self) -> Path:
-        """The site's configuration and certificates."""
-        return self.place(f"/etc/{NAME}")
-
-    @property
-    def configuration(self) -> Path:
-        """The configuration's file."""
-        return self.settings / "station.yaml"
-
-    @property
-    def home(self) -> Path:
-        """The station's state."""
-        return self.place(f"/var/lib/{NAME}")
-
-    @property
-    def recipes(self) -> Path:
-        """The site's recipes, which the pages edit."""
-        return self.home / "recipes"
-
-    @property
-    def backups(self) -> Path:
-        """Backups of records, state and configuration."""
-        return self.place(f"/var/backups/{NAME}")
-
-    @property
-    def cache(self) -> Path:
-        """Data that may be lost."""
-        return self.place(f"/var/cache/{NAME}")
 
     def environment(self) -> dict[str, str]:
         """Environment of the station's commands, with this installation and no other configuration."""
@@ -101,21 +53,12 @@ class Layout:
 
 
 def target(link: Path) -> Path | None:
-    """Return the release that a link points to, or None.
-
-    Args:
-        link: `current` or `previous` of a layout.
-    """
+    """Return the release that a link, `current` or `previous` of a layout, points to; or None."""
     return link.resolve() if link.is_symlink() and link.exists() else None
 
 
 def point(link: Path, release: Path) -> None:
-    """Point a link to a release, atomically.
-
-    Args:
-        link: as above.
-        release: a folder beside or below it.
-    """
+    """Point a link, as above, to a release's folder beside or below it, atomically."""
     new = link.with_name(f".{link.name}.new")
     new.unlink(missing_ok=True)
     new.symlink_to(os.path.relpath(release, link.parent))

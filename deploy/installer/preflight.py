@@ -3,7 +3,6 @@
 import importlib.util
 import os
 import shutil
-from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -40,7 +39,8 @@ def check_disk_space(layout: Layout) -> None:
         Refused: they do not.
     """
     records = layout.home / "records"
-    wanted = [(layout.program, ROOM_BYTES), (layout.backups, sum(file.stat().st_size for file in _files(records)))]
+    kept = [path for path in records.rglob("*") if path.is_file() and "aside" not in path.parts]
+    wanted = [(layout.program, ROOM_BYTES), (layout.backups, sum(file.stat().st_size for file in kept))]
     disks: dict[int, tuple[Path, int]] = {}
     for path, size_bytes in wanted:
         place = next(parent for parent in (path, *path.parents) if parent.is_dir())
@@ -56,11 +56,7 @@ def check_disk_space(layout: Layout) -> None:
 
 
 def check_no_lot(layout: Layout, release: Path) -> None:
-    """Check that no lot is in progress.
-
-    Args:
-        layout: with the records.
-        release: the one in use, which reads them.
+    """Check by the records that no lot is in progress; the release in use reads them.
 
     Raises:
         Refused: a lot is open, or a fruit was inspected within the last minutes.
@@ -85,7 +81,3 @@ def check_no_lot(layout: Layout, release: Path) -> None:
             f"fruit was inspected within the last {QUIET.total_seconds() / 60:.0f} minutes: stop the line and wait, "
             "or upgrade all the same with --during-lot"
         )
-
-
-def _files(folder: Path) -> Iterator[Path]:
-    return (path for path in folder.rglob("*") if path.is_file() and "aside" not in path.parts)

@@ -20,13 +20,7 @@ def run(
     folder: Path | None = None,
     limit_s: float = 300.0,
 ) -> str:
-    """Run a program to its end.
-
-    Args:
-        environment: its environment; the installer's own by default.
-
-    Returns:
-        Its output.
+    """Run a program to its end and return its output; its environment is the installer's own by default.
 
     Raises:
         Failed: it could not be started, did not end in time, or its exit code was not 0; with its last output.
@@ -47,12 +41,7 @@ def run(
 
 
 def station(layout: Layout, release: Path, *arguments: str | Path, limit_s: float = 120.0) -> str:
-    """Run a command of an installed station, as its own user if possible.
-
-    Args:
-        layout: its configuration and state are used.
-        release: its program is used.
-        arguments: as after `station`.
+    """Run a command of an installed release, as the station's own user if possible, with the layout's configuration.
 
     Raises:
         Failed: as for `run`.

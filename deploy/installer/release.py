@@ -24,11 +24,7 @@ ROOM_BYTES = 1_500_000_000
 
 @dataclass(frozen=True)
 class Source:
-    """A checkout or an unpacked archive of the project.
-
-    Args:
-        folder: with `pyproject.toml`, the locks, the packages and `deploy`.
-    """
+    """A checkout or an unpacked archive of the project: `pyproject.toml`, the locks, the packages and `deploy`."""
 
     folder: Path
 
@@ -90,9 +86,6 @@ def complete(release: Path) -> bool:
 
 def make(layout: Layout, source: Source, packages: Packages) -> Path:
     """Build the release of a source, unless it is there. An incomplete one is built again.
-
-    Args:
-        packages: source of the packages.
 
     Raises:
         Failed: pip failed; see its message. The incomplete build is no release and does no harm.

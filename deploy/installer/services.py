@@ -1,58 +1,17 @@
 """System services: systemd, or the unit files of a scratch root."""
 
-# ruff: noqa: D102 (the protocol documents each method)
+# ruff: noqa: D102 (Systemd documents each method)
 
 import os
 import shutil
 from pathlib import Path
-from typing import Protocol
 
 from installer.layout import NAME, TIMER, UNIT, Layout
 from installer.messages import Failed, print_progress
 from installer.programs import run
 
-START_LIMIT_S = 200.0
-STOP_LIMIT_S = 200.0
-
-
-class Services(Protocol):
-    """Operations on the system."""
-
-    def make_user(self) -> None:
-        """Create the station's user. Idempotent."""
-        ...
-
-    def remove_user(self) -> None:
-        """Remove the station's user. Idempotent."""
-        ...
-
-    def enable(self) -> None:
-        """Enable the station and its backups at each boot."""
-        ...
-
-    def disable(self) -> None:
-        """Disable them; they are stopped already."""
-        ...
-
-    def reload(self) -> None:
-        """Reload changed units and device rules."""
-        ...
-
-    def running(self) -> bool:
-        """Return whether the station runs, or is about to."""
-        ...
-
-    def stop(self) -> None:
-        """Stop the station in order. Idempotent."""
-        ...
-
-    def start(self) -> bool:
-        """Start it; returns False in a scratch root, where nothing can be started.
-
-        Raises:
-            Failed: it did not become ready.
-        """
-        ...
+_LIMIT_S = 200.0
+"""For the station's start, and for its end."""
 
 
 class Systemd:
@@ -64,22 +23,27 @@ class Systemd:
         self._booted = Path("/run/systemd/system").is_dir()
 
     def make_user(self) -> None:
+        """Create the station's user. Idempotent."""
         run("systemd-sysusers", f"{NAME}.conf")
 
     def remove_user(self) -> None:
+        """Remove the station's user. Idempotent."""
         _remove_user(self._layout)
 
     def enable(self) -> None:
+        """Enable the station and its backups at each boot."""
         run("systemctl", "enable", UNIT, TIMER)
         if self._booted:
             run("systemctl", "start", TIMER)
 
     def disable(self) -> None:
+        """Disable them; they are stopped already."""
         if self._booted:
             run("systemctl", "stop", TIMER)
         run("systemctl", "disable", UNIT, TIMER)
 
     def reload(self) -> None:
+        """Reload changed units and device rules."""
         if not self._booted:
             return
         run("systemctl", "daemon-reload")
@@ -88,6 +52,7 @@ class Systemd:
             run("udevadm", "trigger", "--subsystem-match=video4linux", "--subsystem-match=tty")
 
     def running(self) -> bool:
+        """Return whether the station runs, or is about to."""
         if not self._booted:
             return False
         try:
@@ -97,15 +62,21 @@ class Systemd:
         return True
 
     def stop(self) -> None:
+        """Stop the station in order. Idempotent."""
         if self._booted:
-            run("systemctl", "stop", UNIT, limit_s=STOP_LIMIT_S)
+            run("systemctl", "stop", UNIT, limit_s=_LIMIT_S)
 
     def start(self) -> bool:
+        """Start it; returns False where nothing can be started, as in a scratch root.
+
+        Raises:
+            Failed: it did not become ready.
+        """
         if not self._booted:
             print_progress("systemd does not run here: the station starts when it does")
             return False
         run("systemctl", "reset-failed", UNIT)
-        run("systemctl", "start", UNIT, limit_s=START_LIMIT_S)
+        run("systemctl", "start", UNIT, limit_s=_LIMIT_S)
         return True
 
 
@@ -145,6 +116,10 @@ class ScratchRoot:
     def _systemctl(self, verb: str) -> None:
         if shutil.which("systemctl"):
             run("systemctl", f"--root={self._layout.root}", verb, UNIT, TIMER)
+
+
+Services = Systemd | ScratchRoot
+"""What the installer does with the system's services."""
 
 
 def _remove_user(layout: Layout, *options: str) -> None:

@@ -59,11 +59,7 @@ def put(layout: Layout, release: Path) -> None:
 
 
 def make_folders(layout: Layout, shipped: Path) -> None:
-    """Create the folders of configuration, state and backups; a missing configuration file with the site's recipes.
-
-    Args:
-        shipped: folder of the shipped recipes, from which a new site's are copied.
-    """
+    """Create the folders of configuration, state and backups; a missing configuration with the shipped recipes."""
     for path, user in ((layout.settings, "root"), (layout.home, NAME), (layout.backups, NAME)):
         make_folder(layout, path)
         path.chmod(0o750)
@@ -91,12 +87,7 @@ def _make_recipes(layout: Layout, shipped: Path) -> None:
 
 
 def make_folder(layout: Layout, folder: Path) -> None:
-    """Create a folder with its parents, and note the new ones.
-
-    Args:
-        layout: with the note.
-        folder: below its root.
-    """
+    """Create a folder below the layout's root with its parents, and note the new ones."""
     missing = [path for path in (folder, *folder.parents) if path.is_relative_to(layout.root) and not path.exists()]
     if not missing:
         return
@@ -116,11 +107,7 @@ def remove_files(layout: Layout) -> None:
 
 
 def remove_folders(layout: Layout, folders: list[str]) -> None:
-    """Remove created folders that are empty.
-
-    Args:
-        folders: as in the manifest.
-    """
+    """Remove created folders, as in the manifest, that are empty."""
     for path in sorted(set(folders), key=len, reverse=True):
         folder = layout.place(path)
         if folder.is_dir() and not any(folder.iterdir()):

@@ -17,7 +17,6 @@ def uninstall(layout: Layout, services: Services, *, purge: bool) -> None:
     """Stop the station and remove all that the installer has put there. Idempotent.
 
     Args:
-        services: of the same system.
         purge: also remove configuration, records, backups and the user.
     """
     note = read_note(layout.manifest)

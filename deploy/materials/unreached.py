@@ -33,11 +33,7 @@ CVES = (
 
 
 def analyses(refs: list[str]) -> list[dict[str, Any]]:
-    """Return the analyses of what is known to be out of reach.
-
-    Args:
-        refs: of the components in the bill.
-    """
+    """Return the analyses of what is known to be out of reach among the bill's components, by their refs."""
     affects = [{"ref": ref} for ref in refs if ref.endswith(OPENSSL)]
     analysis = {"detail": WHY, "justification": "code_not_reachable", "state": "not_affected"}
     return [{"affects": affects, "analysis": analysis, "id": cve} for cve in CVES] if affects else []

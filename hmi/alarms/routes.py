@@ -8,7 +8,7 @@ from starlette.responses import Response
 
 from hmi.web.access import HmiNow, orders
 from hmi.web.gateway import Gateway
-from hmi.web.live import Part
+from hmi.web.live import Part, of_state
 from hmi.web.navigation import Entry
 from hmi.web.page import go_to, show
 from hmi.web.roles import Right
@@ -28,10 +28,6 @@ Operator = Annotated[Caller, Depends(orders(Right.HANDLE_ALARMS))]
 AlarmName = Annotated[str, Path(pattern=r"^[a-z_]{1,40}$")]
 
 
-def _alarms(gateway: Gateway) -> object:
-    return None if gateway.state is None else gateway.state.alarms
-
-
 def _alarms_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     alarms = () if gateway.state is None else gateway.state.alarms
     return {
@@ -42,7 +38,7 @@ def _alarms_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     }
 
 
-PARTS = {"alarms.not_normal": Part("alarms_standing.html.j2", _alarms, _alarms_values)}
+PARTS = {"alarms.not_normal": Part("alarms_standing.html.j2", of_state(lambda state: state.alarms), _alarms_values)}
 
 
 @router.get("/alarms")
@@ -60,9 +56,8 @@ async def history(request: Request, hmi: HmiNow) -> Response:
 @router.get("/alarms/{alarm}")
 async def one(request: Request, hmi: HmiNow, alarm: AlarmName) -> Response:
     """Show one alarm: its meaning, its effect, the remedy."""
-    found = (
-        next((each for each in hmi.gateway.state.alarms if each.alarm == alarm), None) if hmi.gateway.state else None
-    )
+    present = hmi.gateway.state.alarms if hmi.gateway.state else ()
+    found = next((each for each in present if each.alarm == alarm), None)
     if found is None:
         return go_to("/alarms")
     return show(

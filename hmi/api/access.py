@@ -35,11 +35,7 @@ def tokens_of(request: Request) -> ApiTokens:
 
 
 class RefusedTokens:
-    """Count of refused tokens: the audit trail gets the first, tenth, hundredth … of an hour, so that nobody fills it.
-
-    Args:
-        clock: monotonic.
-    """
+    """Count of refused tokens: only the first, tenth, hundredth … of an hour get into the audit trail, to spare it."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock

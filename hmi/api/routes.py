@@ -29,12 +29,7 @@ from hmi.web.access import HmiNow
 from hmi.web.roles import Right
 from station.channel.panel import Actor, AlarmList, ListAlarms
 from station.channel.panel_maintenance_queries import GetHealth, Health
-from station.channel.panel_queries import (
-    EndLot,
-    LotView,
-    Search,
-    StartLot,
-)
+from station.channel.panel_queries import EndLot, LotView, Search, StartLot
 from station.vocabulary import OutcomeName, Reason
 
 IN_SCHEMA = True
@@ -50,7 +45,6 @@ _REFUSED: dict[int | str, dict[str, Any]] = {
     503: {"model": Error, "description": "The station gave no answer in time."},
 }
 _NOT_FOUND: dict[int | str, dict[str, Any]] = {404: {"model": Error, "description": "There is none."}}
-
 _UNREADABLE: dict[int | str, dict[str, Any]] = {400: {"model": Error, "description": "The body cannot be read."}}
 
 
@@ -135,7 +129,7 @@ async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeDetails:
     found = next((each for each in (await hmi.past.recipes.read()).states if each.name == name), None)
     if found is None:
         raise HTTPException(404, f"there is no recipe {name}; /api/v1/recipes lists them")
-    values = found.control.recipe.model_dump(mode="json") if found.control is not None else None
+    values = found.control and found.control.recipe.model_dump(mode="json")
     return RecipeDetails(**_short(found), values=values)
 
 

@@ -21,8 +21,6 @@ MOST_TOKENS = 100
 NAME = r"^[A-Za-z0-9][A-Za-z0-9 _.-]{0,39}$"
 ROLES = (Role.VIEWER, Role.OPERATOR)
 """A viewer's token reads; an operator's also begins and ends lots."""
-
-
 _DAY_MS = 86_400_000
 
 
@@ -45,11 +43,7 @@ class _File(BaseModel):
 
 
 class ApiTokens:
-    """Tokens of one station; a change by the command line takes effect at once.
-
-    Args:
-        folder: of the HMI within the home folder.
-    """
+    """Tokens of one station, in the HMI's folder; a change by the command line takes effect at once."""
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / FILE_NAME

@@ -11,9 +11,9 @@ from starlette.responses import Response
 from hmi.web.access import HmiNow, LocaleNow, orders
 from hmi.web.context import Hmi
 from hmi.web.gateway import Gateway, actor_of
-from hmi.web.live import Part
+from hmi.web.live import Part, of_state
 from hmi.web.navigation import Entry
-from hmi.web.page import go_to, show
+from hmi.web.page import go_to, show, show_part
 from hmi.web.problem import Problem
 from hmi.web.roles import Right
 from hmi.web.sessions import Caller
@@ -42,26 +42,17 @@ class Change(NamedTuple):
     then: str
 
 
-def _order(gateway: Gateway) -> object:
-    state = gateway.state
-    return (
-        None
-        if state is None
-        else (state.orders, state.ready, state.why_not_ready, state.check_due, state.recipe, state.busy)
-    )
-
-
 def _order_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     state = gateway.state
-    order = (
-        next((each for each in state.orders if each.order is OperatorCommandName.CHOOSE_RECIPE), None)
-        if state
-        else None
-    )
+    given = state.orders if state else ()
+    order = next((each for each in given if each.order is OperatorCommandName.CHOOSE_RECIPE), None)
     return {"state": state, "order": order}
 
 
-PARTS = {"change.order": Part("change_order.html.j2", _order, _order_values)}
+_ORDER = of_state(
+    lambda state: (state.orders, state.ready, state.why_not_ready, state.check_due, state.recipe, state.busy)
+)
+PARTS = {"change.order": Part("change_order.html.j2", _ORDER, _order_values)}
 
 
 @router.get("/change")
@@ -73,7 +64,7 @@ async def change(request: Request, hmi: HmiNow) -> Response:
 @router.get("/change/part")
 async def tiles_part(hmi: HmiNow, locale: LocaleNow) -> Response:
     """Render the same as a part, for polling: the active recipe changes while the page is open."""
-    return Response(hmi.renderer.render("change_tiles.html.j2", locale, await _tiles(hmi)), media_type="text/html")
+    return show_part(hmi, locale, "change_tiles.html.j2", await _tiles(hmi))
 
 
 @router.get("/change/progress")
@@ -94,8 +85,7 @@ async def confirm(
 async def confirm_part(hmi: HmiNow, locale: LocaleNow, number: Annotated[int, Path(ge=1, le=65_535)]) -> Response:
     """Render the differences as a part; the page reloads itself when another recipe becomes active."""
     values = await _differences(hmi, locale, number)
-    html = hmi.renderer.render("change_what.html.j2", locale, values)
-    return Response(html, media_type="text/html", headers={"x-state": values["from_recipe"]})
+    return show_part(hmi, locale, "change_what.html.j2", values, {"x-state": values["from_recipe"]})
 
 
 @router.post("/change")
@@ -131,12 +121,7 @@ async def _differences(hmi: Hmi, locale: Locale, number: int) -> dict[str, Any]:
 
 
 def changes(now: RecipeSummary | None, then: RecipeSummary, locale: Locale) -> list[Change]:
-    """Return the differences that matter at the line; all values if no recipe is active.
-
-    Args:
-        now: the active recipe.
-        then: the selected recipe.
-    """
+    """Return the differences that matter at the line, from the active to the selected recipe; all if none is active."""
     before, after = {} if now is None else _values(now, locale), _values(then, locale)
     lines = [Change(key, before.get(key, NO_VALUE), value) for key, value in after.items()]
     return [line for line in lines if line.now != line.then]

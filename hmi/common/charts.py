@@ -1,12 +1,15 @@
 """Charts of the pages: area over closing, in the reader's language."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import TypeVar
 
 from markupsafe import Markup
 
 from hmi.web.translation import Locale
+from station.channel.panel_live import LimitView
 from station.charts.area_chart import Curve, Limit, Mark, Size, Texts, area_chart
 
+LimitT = TypeVar("LimitT", Limit, LimitView)
 _SAME_MM = 0.01
 """Closings are rounded on their way to the pages."""
 
@@ -39,3 +42,10 @@ def mark_decided(marks: list[Mark], points: Sequence[tuple[float, float]], closi
     nearest = min(range(len(points)), key=lambda place: abs(points[place][0] - closing_mm))
     if marks[nearest] == "point" and abs(points[nearest][0] - closing_mm) < _SAME_MM:
         marks[nearest] = "decided"
+
+
+def deciding_limit(limits: Iterable[LimitT], decided_mm: float | None) -> LimitT | None:
+    """Return the limit nearest to where the fruit was decided; None if there was no area."""
+    if decided_mm is None:
+        return None
+    return min(limits, key=lambda limit: abs(limit.closing_mm - decided_mm), default=None)

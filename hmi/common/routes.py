@@ -16,7 +16,7 @@ from hmi.web.access import (
     caller_of,
 )
 from hmi.web.gateway import Gateway
-from hmi.web.live import Part
+from hmi.web.live import Part, of_state
 from hmi.web.page import go_to
 from hmi.web.problem import Problem
 from hmi.web.streams import Stream
@@ -27,28 +27,19 @@ MOST_PARTS = 20
 _A_YEAR_S = 365 * 24 * 3600
 
 
-def _alarms(gateway: Gateway) -> object:
-    return None if gateway.state is None else gateway.state.alarms
-
-
 def _alarm_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     state = gateway.state
     shown = [] if state is None else [each for each in state.alarms if each.shelved_until_utc_ms is None]
     return {"alarms": sorted(shown, key=lambda each: not each.active), "heard": state is not None}
 
 
-def _state(gateway: Gateway) -> object:
-    state = gateway.state
-    return None if state is None else (state.state, state.ready, state.why_not_ready, state.recipe, state.simulated)
-
-
-def _state_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
-    return {"state": gateway.state}
-
-
 PARTS = {
-    "frame.alarm": Part("layout_alarm.html.j2", _alarms, _alarm_values),
-    "frame.state": Part("layout_state.html.j2", _state, _state_values),
+    "frame.alarm": Part("layout_alarm.html.j2", of_state(lambda state: state.alarms), _alarm_values),
+    "frame.state": Part(
+        "layout_state.html.j2",
+        of_state(lambda state: (state.state, state.ready, state.why_not_ready, state.recipe, state.simulated)),
+        lambda gateway, _: {"state": gateway.state},
+    ),
 }
 
 

@@ -46,14 +46,10 @@ def replace(file: Path, text: str) -> None:
 
 def changes(old: str, new: str) -> tuple[dict[str, JsonValue], dict[str, JsonValue]]:
     """Return the settings that differ, by their dotted names, as they were and as they are."""
-    before, after = dict(_flat(old)), dict(_flat(new))
+    before, after = (dict(_leaves(parse_document(text.encode(), "").value, "")) for text in (old, new))
     names = [name for name in {**before, **after} if before.get(name) != after.get(name)]
     was, now = ({name: each[name] for name in names if name in each} for each in (before, after))
     return was, now
-
-
-def _flat(text: str) -> Iterator[tuple[str, JsonValue]]:
-    return _leaves(parse_document(text.encode(), "").value, "")
 
 
 def _leaves(value: JsonValue, path: str) -> Iterator[tuple[str, JsonValue]]:

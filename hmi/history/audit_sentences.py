@@ -29,11 +29,7 @@ class Sentence(NamedTuple):
 
 
 def sentence(row: AuditRow, fruit: Mapping[int, str], locale: Locale) -> Sentence:
-    """Write a row as a sentence.
-
-    Args:
-        fruit: titles of the recipes by their PLC numbers.
-    """
+    """Write a row as a sentence, with the recipes' titles by their PLC numbers."""
     old, new = _mapping(row.old), _mapping(row.new)
     argument = new.get("argument", 0)
     values = {

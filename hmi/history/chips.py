@@ -28,12 +28,7 @@ class Days(NamedTuple):
 
 
 def chips(terms: Terms, lot: str | None, today: datetime) -> list[Chip]:
-    """Return the chips; each leaves the other conditions as they are.
-
-    Args:
-        lot: the current lot; None or empty for none.
-        today: local time now.
-    """
+    """Return the chips, for the current lot if any and the local time; each leaves the other conditions."""
     wanted = {
         "today": _day(today),
         "lot": {"lot": lot or ""},

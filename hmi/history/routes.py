@@ -10,21 +10,19 @@ from markupsafe import Markup
 from pydantic import StringConstraints, ValidationError
 from starlette.responses import Response
 
-from hmi.common.charts import area_over_closing, mark_decided
+from hmi.common.charts import area_over_closing, deciding_limit, mark_decided
 from hmi.history.audit_sentences import sentence
 from hmi.history.chips import chips, days
 from hmi.history.export_options import check_text, options_of
 from hmi.past.past import FullRecord, Page, Stages, judged_of
-from hmi.web.access import GenuineCaller, HmiNow, LocaleNow, caller_of
+from hmi.web.access import GenuineCaller, HmiNow, LocaleNow, caller_of, known
 from hmi.web.context import Hmi
 from hmi.web.gateway import actor_of
 from hmi.web.navigation import Entry
 from hmi.web.page import go_to, show
 from hmi.web.problem import Problem
-from hmi.web.sessions import Caller
 from hmi.web.translation import Locale
 from station.channel.line import Noted
-from station.channel.panel import Actor
 from station.channel.panel_queries import NoteExport, Search
 from station.charts.area_chart import Curve, Limit, Mark
 from station.charts.spark import spark
@@ -86,16 +84,14 @@ async def search(
     terms |= {"from": begun_from, "to": begun_to}
     today = datetime.now().astimezone()
     wanted = None if typed else search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
-    found = Page((), None)
-    if wanted is not None:
-        found = await hmi.past.find(wanted, PAGE, below)
+    found = Page((), None) if wanted is None else await hmi.past.find(wanted, PAGE, below)
     recipes = (await hmi.past.recipes.read()).states
     return show(
         request,
         "history.html.j2",
         status=200 if wanted is not None else 400,
         terms=terms,
-        chips=chips(terms, hmi.gateway.state.lot if hmi.gateway.state is not None else None, today),
+        chips=chips(terms, hmi.gateway.state and hmi.gateway.state.lot, today),
         days=days(terms, today),
         bad=wanted is None,
         found=found,
@@ -126,7 +122,7 @@ async def export(
     wanted = search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
     if wanted is None:
         raise Problem(400, "problem.bad_form")
-    actor, options, folder = _actor(caller), options_of(wanted), hmi.jobs.folder()
+    actor, options, folder = actor_of(known(caller)), options_of(wanted), hmi.jobs.folder()
     await hmi.gateway.request(NoteExport(search=wanted, actor=actor), Noted, deadline_s=DEADLINE_S)
     job = hmi.jobs.begin("export", folder, ["records", "export", str(folder / f"inspections.{form}"), *options])
     return go_to(f"/jobs/{job.id}?back=/history")
@@ -135,7 +131,7 @@ async def export(
 @router.post("/report")
 async def report(hmi: HmiNow, caller: GenuineCaller, lot: Annotated[str, Form(max_length=32)]) -> Response:
     """Start a lot's report."""
-    _actor(caller)
+    known(caller)
     check_text(lot)
     folder = hmi.jobs.folder()
     job = hmi.jobs.begin("lot_report", folder, ["records", "report", "--", lot, str(folder / "lot.html")])
@@ -172,7 +168,7 @@ async def inspection(request: Request, hmi: HmiNow, locale: LocaleNow, sequence:
         before=before,
         after=after,
         reasons=[(str(code), reason_message(code)) for code in (reply.standing.reasons if reply.standing else ())],
-        limit=_deciding_limit(reply),
+        limit=deciding_limit(_limits(reply)[0], reply.standing and reply.standing.closing_mm),
         chart=_chart(reply, locale),
         steps=_steps(reply),
         reference=next((each for each in reply.images if each.kind == "reference"), None),
@@ -272,14 +268,6 @@ def _limits(reply: FullRecord) -> tuple[list[Limit], float | None]:
         return [], None
 
 
-def _deciding_limit(reply: FullRecord) -> Limit | None:
-    """Return the limit nearest to where the fruit was decided; None if there was no area."""
-    decided_mm = reply.standing.closing_mm if reply.standing is not None else None
-    if decided_mm is None:
-        return None
-    return min(_limits(reply)[0], key=lambda limit: abs(limit.closing_mm - decided_mm), default=None)
-
-
 def _chart(reply: FullRecord, locale: Locale) -> Markup | None:
     """Draw the curve with the limits of the recipe at that time."""
     points = [
@@ -292,16 +280,10 @@ def _chart(reply: FullRecord, locale: Locale) -> Markup | None:
     limits, early = _limits(reply)
     label = locale.text("chart.fruit_label", n=reply.sequence)
     marks: list[Mark] = ["point"] * len(points)
-    mark_decided(marks, points, reply.standing.closing_mm if reply.standing is not None else None)
+    mark_decided(marks, points, reply.standing and reply.standing.closing_mm)
     return area_over_closing([Curve("own", points, marks)], limits, locale, label, early)
 
 
 def _utc_ms(text: str) -> int | None:
     """Convert a browser's local date and time, in the machine's zone."""
     return round(1000 * datetime.fromisoformat(text).astimezone().timestamp()) if text else None
-
-
-def _actor(caller: Caller) -> Actor:
-    if not caller.name:
-        raise Problem(403, "problem.not_allowed", role="operator")
-    return actor_of(caller)

@@ -93,11 +93,7 @@ class Job:
 
 
 class Jobs:
-    """Queue that runs one job after the other.
-
-    Args:
-        command: the command line that gets the arguments.
-    """
+    """Queue that runs one job after the other, with the command line that gets the arguments."""
 
     def __init__(self, home: Path, command: Sequence[str] = (sys.executable, "-m", "station")) -> None:
         self._home, self._command = home, tuple(command)
@@ -105,10 +101,7 @@ class Jobs:
         self._turn = asyncio.Lock()
 
     def folder(self, files: Mapping[str, str] = MappingProxyType({})) -> Path:
-        """Make a new job's folder, whose name is its id.
-
-        Args:
-            files: texts to put there, by name.
+        """Make a new job's folder, whose name is its id, with texts as files by their names.
 
         Raises:
             JobError: too many wait, or the disk is full.
@@ -130,11 +123,9 @@ class Jobs:
         return folder
 
     def begin(self, kind: Kind, folder: Path, arguments: Sequence[str], of: int = 0) -> Job:
-        """Queue a job. Not idempotent.
+        """Queue a job that writes its files into a folder from `folder`. Not idempotent.
 
         Args:
-            folder: from `folder`; the job writes its files there.
-            arguments: of the station's command line.
             of: number of steps, where it is known.
         """
         job = Job(folder.name, kind, folder, arguments, of)

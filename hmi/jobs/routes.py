@@ -6,9 +6,9 @@ from fastapi import APIRouter, Depends, Query, Request
 from pydantic import StringConstraints
 from starlette.responses import FileResponse, Response
 
-from hmi.web.access import GenuineCaller, HmiNow, LocaleNow, caller_of
+from hmi.web.access import GenuineCaller, HmiNow, LocaleNow, caller_of, known
 from hmi.web.context import Hmi
-from hmi.web.page import go_to, show
+from hmi.web.page import go_to, show, show_part
 from hmi.web.problem import Problem
 
 router = APIRouter(prefix="/jobs")
@@ -22,8 +22,7 @@ Back = Annotated[str, Query(max_length=200, pattern=r"^/([A-Za-z0-9_][A-Za-z0-9_
 
 async def logged_in(request: Request) -> None:
     """Require a log-in for files: an export holds all data of the station."""
-    if not caller_of(request).name:
-        raise Problem(403, "problem.not_allowed", role="operator")
+    known(caller_of(request))
 
 
 @router.get("/{job}")
@@ -36,15 +35,13 @@ async def job(request: Request, hmi: HmiNow, job: JobId, back: Back = "/history"
 async def part(hmi: HmiNow, locale: LocaleNow, job: JobId) -> Response:
     """Render the same as a part of the page, for polling."""
     found = hmi.jobs.get(job)
-    html = hmi.renderer.render("job_part.html.j2", locale, {"job": found})
-    return Response(html, media_type="text/html", headers={"x-over": "" if found.open else "1"})
+    return show_part(hmi, locale, "job_part.html.j2", {"job": found}, {"x-over": "" if found.open else "1"})
 
 
 @router.post("/{job}/end")
 async def end(hmi: HmiNow, caller: GenuineCaller, job: JobId) -> Response:
     """Cancel a job."""
-    if not caller.name:
-        raise Problem(403, "problem.not_allowed", role="operator")
+    known(caller)
     await hmi.jobs.end(job)
     return go_to(f"/jobs/{job}")
 

@@ -17,11 +17,10 @@ from hmi.web.access import HmiNow, LocaleNow, may, orders
 from hmi.web.context import Hmi
 from hmi.web.gateway import actor_of
 from hmi.web.navigation import Entry
-from hmi.web.page import go_to, show
+from hmi.web.page import go_to, show, show_part
 from hmi.web.problem import Problem
 from hmi.web.roles import Right
 from hmi.web.sessions import Caller
-from hmi.web.translation import Locale
 from station.channel.messages import ChannelError, RefusedError
 from station.channel.panel_live import (
     GetRecipes,
@@ -77,7 +76,7 @@ async def health(request: Request, hmi: HmiNow) -> Response:
 @router.get("/health/part")
 async def health_part(hmi: HmiNow, locale: LocaleNow) -> Response:
     """Render the same as a part, for polling."""
-    return await _part(hmi, locale, "maintenance_health.html.j2", await _health(hmi))
+    return show_part(hmi, locale, "maintenance_health.html.j2", await _health(hmi))
 
 
 @router.get("/support.zip")
@@ -110,7 +109,7 @@ async def hand(
 async def hand_part(hmi: HmiNow, locale: LocaleNow) -> Response:
     """Render the fingers' width, for polling; the page reloads itself when moving becomes allowed or refused."""
     values = await _health(hmi)
-    return await _part(hmi, locale, "maintenance_width.html.j2", values, {"x-state": _allowed(values)})
+    return show_part(hmi, locale, "maintenance_width.html.j2", values, {"x-state": _allowed(values)})
 
 
 @router.post("/mode")
@@ -168,7 +167,7 @@ async def image(request: Request, hmi: HmiNow, contact: bool = True) -> Response
 @router.get("/image/part")
 async def image_part(hmi: HmiNow, locale: LocaleNow, contact: bool = True) -> Response:  # noqa: FBT001, FBT002
     """Render the next image with its contact; requested after the one before was taken."""
-    return await _part(hmi, locale, "maintenance_live.html.j2", await _live(hmi, contact=contact))
+    return show_part(hmi, locale, "maintenance_live.html.j2", await _live(hmi, contact=contact))
 
 
 @router.get("/image/{place}.jpg")
@@ -192,7 +191,7 @@ async def sensor_part(hmi: HmiNow, locale: LocaleNow) -> Response:
     run = reply["now"].run
     over = run is None or run.state not in {"running", "waiting"}
     state = "" if run is None else run.state
-    return await _part(hmi, locale, "maintenance_run.html.j2", reply, {"x-over": "1" if over else "", "x-state": state})
+    return show_part(hmi, locale, "maintenance_run.html.j2", reply, {"x-over": "1" if over else "", "x-state": state})
 
 
 @router.get("/sensor/{kind}/{name}")
@@ -249,7 +248,7 @@ async def registers(request: Request, hmi: HmiNow) -> Response:
 @router.get("/registers/part")
 async def registers_part(hmi: HmiNow, locale: LocaleNow) -> Response:
     """Render the same as a part, for polling."""
-    return await _part(hmi, locale, "maintenance_register_table.html.j2", {"reply": await _registers(hmi)})
+    return show_part(hmi, locale, "maintenance_register_table.html.j2", {"reply": await _registers(hmi)})
 
 
 @router.get("/log")
@@ -305,12 +304,6 @@ async def _calibration(hmi: Hmi) -> dict[str, Any]:
 
 async def _registers(hmi: Hmi) -> Registers:
     return await hmi.gateway.request(GetRegisters(), Registers, deadline_s=DEADLINE_S)
-
-
-async def _part(
-    hmi: Hmi, locale: Locale, template: str, values: dict[str, Any], headers: dict[str, str] | None = None
-) -> Response:
-    return Response(hmi.renderer.render(template, locale, values), media_type="text/html", headers=headers)
 
 
 def _mm(text: str) -> float:

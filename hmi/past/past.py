@@ -79,11 +79,7 @@ class Past:
         self._worker.close()
 
     async def find(self, search: Search, limit: int, below: int | None = None) -> Page:
-        """Return one page of a search, newest first.
-
-        Args:
-            below: of the page before; None for the first.
-        """
+        """Return one page of a search, newest first; the first one, or that below a number."""
         return await self._read(lambda connection: find_page(connection, Query(**dict(search)), limit, below))
 
     async def inspection(self, sequence: int) -> FullRecord:
@@ -104,12 +100,7 @@ class Past:
         return await self._read(lambda connection: read_lots(connection, limit, name=name))
 
     async def audit(self, limit: int, action: str = "", subject: str = "") -> list[AuditRow]:
-        """Return the latest rows of the audit trail, newest first.
-
-        Args:
-            action: of this action, or of all that begin so.
-            subject: with this text in their subject.
-        """
+        """Return the latest rows of actions that begin so and whose subject has this text, newest first."""
         return await self._read(lambda connection: read_audit(connection, limit, action, subject)[::-1])
 
     async def alarm_changes(self, limit: int) -> list[AlarmChange]:

@@ -34,11 +34,7 @@ class Stages(NamedTuple):
 
 
 def read_image(folder: Path, sha256: str) -> bytes:
-    """Read one stored image.
-
-    Args:
-        folder: of the records.
-        sha256: the file's content hash.
+    """Read one stored image from the records' folder, by its content hash.
 
     Raises:
         RecordsError: it is not stored any more.

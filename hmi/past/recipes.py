@@ -86,11 +86,7 @@ class PastRecipes:
         return await self._worker.do(lambda: self._reader.revision(name, revision))
 
     async def history(self, name: str, below: int | None) -> RevisionPage:
-        """Return a page of a recipe's revisions.
-
-        Args:
-            below: of the page before; None for the first.
-        """
+        """Return a page of a recipe's revisions: the first one, or that below a revision."""
 
         def read() -> RevisionPage:
             known = self._reader.history(name)

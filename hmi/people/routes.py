@@ -6,7 +6,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Form, Query, Request
 from starlette.responses import Response
 
-from hmi.web.access import GenuineCaller, HmiNow, address_of, orders
+from hmi.web.access import GenuineCaller, HmiNow, address_of, known, orders
 from hmi.web.context import Hmi
 from hmi.web.gateway import actor_of
 from hmi.web.navigation import Entry
@@ -83,9 +83,7 @@ async def log_out(hmi: HmiNow, caller: GenuineCaller) -> Response:
 @router.post("/people/own-pin")
 async def own_pin(request: Request, hmi: HmiNow, caller: GenuineCaller, old: Pin, pin: Pin) -> Response:
     """Change one's own PIN; one's other sessions end."""
-    if not caller.name:
-        raise Problem(403, "problem.not_allowed", role=Role.OPERATOR)
-    who = caller.name, address_of(request)
+    who = known(caller).name, address_of(request)
     if (wait_s := hmi.pins.wait_s(*who)) > 0:
         return _page(request, hmi, "/", "people.wait", str(int(wait_s) + 1), status=429)
     hmi.pins.tried(*who)

@@ -59,40 +59,23 @@ def groups(values: Mapping[str, Any]) -> list[Group]:
     gathered: dict[Path, list[Field]] = {}
     for path, value in _leaves(values, ()):
         if path[0] not in FIXED:
-            gathered.setdefault(_group(path), []).append(_field(root, path, value))
-    made = []
-    for path, fields in gathered.items():
-        made.append(Group(dotted(path), _key(path), *_texts(root, path), tuple(fields)))
-    return made
+            # The innermost mapping, with the place in a list: each threshold is a group of its own.
+            gathered.setdefault(path[:-1], []).append(_field(root, path, value))
+    return [Group(dotted(path), _key(path), *_texts(root, path), tuple(fields)) for path, fields in gathered.items()]
 
 
 def changed(values: Mapping[str, Any], form: Mapping[str, str]) -> dict[str, Any]:
-    """Return the differences between a form and the recipe.
-
-    Args:
-        values: the recipe's as they are.
-        form: texts by the fields' paths; a missing field is unchanged.
+    """Return the differences between a form, texts by the fields' paths, and the recipe; a missing field is unchanged.
 
     Raises:
         BadFieldError: a text is no value of its field's kind; the station checks the bounds.
     """
-    changes = {}
-    for group in groups(values):
-        for field in group.fields:
-            text = form.get(field.path)
-            if text is None:
-                continue
-            value = parsed(field, text)
-            if value != field.value:
-                changes[field.path] = value
-    return changes
+    typed = [(field, form[field.path]) for group in groups(values) for field in group.fields if field.path in form]
+    return {field.path: value for field, text in typed if (value := parsed(field, text)) != field.value}
 
 
 def parsed(field: Field, text: str) -> Any:
-    """Parse a field's typed text.
-
-    Args:
-        text: with a decimal comma or point.
+    """Parse a field's typed text, with a decimal comma or point.
 
     Raises:
         BadFieldError: it is no value of its kind.
@@ -106,10 +89,8 @@ def parsed(field: Field, text: str) -> Any:
                 return [_number(part) for part in _LIST.split(text) if part]
             case "switch":
                 return text == "true"
-            case "choice":
-                if text not in field.choices:
-                    raise BadFieldError(field)
-                return text
+            case "choice" if text not in field.choices:
+                raise BadFieldError(field)
             case _:
                 return text
     except ValueError:
@@ -117,11 +98,7 @@ def parsed(field: Field, text: str) -> Any:
 
 
 def formatted(field: Field, decimal: str) -> str:
-    """Format a field's value for typing.
-
-    Args:
-        decimal: the language's decimal sign.
-    """
+    """Format a field's value for typing, with the language's decimal sign."""
     match field.value:
         case None:
             return ""
@@ -152,18 +129,17 @@ def with_changes(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[
 
 def dotted(path: Path) -> str:
     """Return a path as the recipe editor takes it."""
-    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
-    return text.removeprefix(".")
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).removeprefix(".")
 
 
 def field_texts() -> dict[str, tuple[str, str]]:
     """Return the English titles and descriptions of all fields and groups of a recipe, by the catalogue's keys."""
     root = schema_of(Recipe)
-    leaves = [path for path, _ in _schema_leaves(root, resolved(root, root), ()) if path[0] not in FIXED]
-    return {_key(path): _texts(root, path) for path in (*leaves, *map(_group, leaves))}
+    leaves = [path for path in _schema_leaves(root, resolved(root, root), ()) if path[0] not in FIXED]
+    return {_key(path): _texts(root, path) for path in (*leaves, *(path[:-1] for path in leaves))}
 
 
-def _schema_leaves(root: dict[str, Any], node: dict[str, Any], path: Path) -> Iterator[tuple[Path, None]]:
+def _schema_leaves(root: dict[str, Any], node: dict[str, Any], path: Path) -> Iterator[Path]:
     branch = branches(node, root)[0]
     item = resolved(branch.get("items") or {}, root)
     if "properties" in branch:
@@ -172,7 +148,7 @@ def _schema_leaves(root: dict[str, Any], node: dict[str, Any], path: Path) -> It
     elif "properties" in item:
         yield from _schema_leaves(root, item, (*path, 0))
     else:
-        yield path, None
+        yield path
 
 
 def _leaves(value: Any, path: Path) -> Iterator[tuple[Path, Any]]:
@@ -184,11 +160,6 @@ def _leaves(value: Any, path: Path) -> Iterator[tuple[Path, Any]]:
             yield from _leaves(inner, (*path, place))
     else:
         yield path, value
-
-
-def _group(path: Path) -> Path:
-    """Return the innermost mapping, with the place in a list: each threshold is a group of its own."""
-    return path[:-1]
 
 
 def _texts(root: dict[str, Any], path: Path) -> tuple[str, str]:

@@ -1,5 +1,6 @@
 """Recipes page: state, editing as drafts with every limit drawn on past curves, approval by another person."""
 
+import contextlib
 import json
 import re
 from collections.abc import Mapping
@@ -18,7 +19,7 @@ from hmi.web.access import HmiNow, LocaleNow, caller_of, orders
 from hmi.web.context import Hmi
 from hmi.web.gateway import actor_of
 from hmi.web.navigation import Entry
-from hmi.web.page import go_to, show
+from hmi.web.page import go_to, show, show_part
 from hmi.web.problem import Problem
 from hmi.web.roles import Right
 from hmi.web.sessions import Caller
@@ -86,13 +87,10 @@ async def chart(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) ->
     stored = (await _state(hmi, name)).valid_file.recipe
     values, typed = stored.model_dump(mode="json"), dict[str, Any]()
     for path, text in _typed(request.query_params).items():
-        try:
+        with contextlib.suppress(BadFieldError):
             typed |= changed(values, {path: text})
-        except BadFieldError:
-            continue
     drawn = await _drawn(hmi, locale, stored, with_changes(values, typed))
-    html = hmi.renderer.render("recipe_chart.html.j2", locale, {"drawn": drawn})
-    return Response(html, media_type="text/html")
+    return show_part(hmi, locale, "recipe_chart.html.j2", {"drawn": drawn})
 
 
 @router.post("/{name}/draft")

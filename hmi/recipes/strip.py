@@ -37,12 +37,7 @@ class Strip(NamedTuple):
 
 
 def strip(values: Iterable[tuple[str, float]], limits: Sequence[tuple[str, float]]) -> Strip:
-    """Lay one number of many fruit out on a line that begins at 0.
-
-    Args:
-        values: class and value of each fruit.
-        limits: `limit` or `early`, and its value.
-    """
+    """Lay a number of many fruit, with their class, out on a line from 0, with its `limit` and `early` lines."""
     known = list(values)
     largest = max((value for _, value in (*known, *limits)), default=1.0)
     x = Axis(0.0, _ROOM * largest, LEFT, RIGHT, 6)

@@ -45,7 +45,10 @@ def trend(fruit: Sequence[FruitSummary], locale: Locale) -> Markup:
     parts.append(f'<text x="{width}" y="{height - 6}" text-anchor="end">{escape(note)}</text>')
     rejected = [sum(each.outcome != "PASS" for each in bucket) for bucket in buckets]
     label = locale.text("run.trend_label", figures=", ".join(map(str, rejected)) or "–")  # noqa: RUF001 (a dash)
-    return _svg(width, height, escape(label), "".join(parts))
+    return Markup(  # noqa: S704 (numbers, our own classes, and escaped texts)
+        f'<svg class="chart" viewBox="0 0 {width} {height}" role="img" font-size="13" aria-label="{escape(label)}">'
+        f"{''.join(parts)}</svg>"
+    )
 
 
 def bar(value: float, largest: float) -> Markup:
@@ -62,11 +65,3 @@ def _bar(name: str, x: float, y: float, width: float, height: float) -> str:
     if height <= 0:
         return ""
     return f'<rect class="{name}" x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}"/>'
-
-
-def _svg(width: int, height: int, label: object, inside: str) -> Markup:
-    """Make a chart; its content is already escaped."""
-    return Markup(  # noqa: S704 (numbers, our own classes, and escaped texts)
-        f'<svg class="chart" viewBox="0 0 {width} {height}" role="img" font-size="13" aria-label="{label}">'
-        f"{inside}</svg>"
-    )

@@ -10,10 +10,11 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Form, Path, Request
 from starlette.responses import Response
 
+from hmi.common.charts import deciding_limit
 from hmi.run import charts
 from hmi.web.access import HmiNow, LocaleNow, orders
 from hmi.web.gateway import Gateway, actor_of
-from hmi.web.live import Part
+from hmi.web.live import Part, of_state
 from hmi.web.navigation import Entry
 from hmi.web.page import go_to, show
 from hmi.web.problem import Problem
@@ -26,7 +27,6 @@ from station.channel.panel_live import (
     FruitSummary,
     GetFruit,
     GetPicture,
-    LimitView,
     OperatorCommand,
     OperatorCommandName,
     OperatorCommandView,
@@ -56,24 +56,10 @@ _IMMUTABLE = "private, max-age=31536000, immutable"
 Sequence = Annotated[int, Path(ge=1, lt=2**32)]
 
 
-def _activity(gateway: Gateway) -> object:
-    state = gateway.state
-    return None if state is None else state.model_copy(update={"utc_ms": 0, "devices": ()})
-
-
 def _activity_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     state = gateway.state
     order = next((each for each in state.orders if each.order in _ORDERS), None) if state else None
     return {"state": state, "order": order}
-
-
-def _buttons(gateway: Gateway) -> object:
-    state = gateway.state
-    return None if state is None else (state.may, state.recoveries, state.needs_person)
-
-
-def _buttons_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
-    return {"state": gateway.state, "OperatorCommandName": OperatorCommandName}
 
 
 def _fruit(gateway: Gateway) -> object:
@@ -117,20 +103,24 @@ def _takt_s(fruit: tuple[FruitSummary, ...]) -> float | None:
     return median(between_ms) / 1000 if len(between_ms) >= _LEAST_INTERVALS else None
 
 
-def _recent(gateway: Gateway) -> object:
-    return gateway.recent
-
-
 def _recent_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     return {"fruit": gateway.recent.fruit[:MOST_RECENT], "spark": spark}
 
 
 PARTS = {
-    "run.activity": Part("run_activity.html.j2", _activity, _activity_values),
-    "run.buttons": Part("run_buttons.html.j2", _buttons, _buttons_values),
+    "run.activity": Part(
+        "run_activity.html.j2",
+        of_state(lambda state: state.model_copy(update={"utc_ms": 0, "devices": ()})),
+        _activity_values,
+    ),
+    "run.buttons": Part(
+        "run_buttons.html.j2",
+        of_state(lambda state: (state.may, state.recoveries, state.needs_person)),
+        lambda gateway, _: {"state": gateway.state, "OperatorCommandName": OperatorCommandName},
+    ),
     "run.fruit": Part("run_fruit.html.j2", _fruit, _fruit_values),
     "run.figures": Part("run_figures.html.j2", _figures, _figures_values),
-    "run.recent": Part("run_recent.html.j2", _recent, _recent_values),
+    "run.recent": Part("run_recent.html.j2", lambda gateway: gateway.recent, _recent_values),
 }
 
 
@@ -138,15 +128,8 @@ def fruit_values(fruit: Fruit | None, locale: Locale) -> Mapping[str, Any]:
     """Return the values that `run_fruit.html.j2` needs for a fruit."""
     if fruit is None:
         return {"fruit": None}
-    return {"fruit": fruit, "limit": _deciding_limit(fruit), "curve": charts.curve(fruit, locale)}
-
-
-def _deciding_limit(fruit: Fruit) -> LimitView | None:
-    """Return the limit nearest to where the fruit was decided; None if there was no area."""
-    decided_mm = fruit.short.closing_mm
-    if decided_mm is None:
-        return None
-    return min(fruit.limits, key=lambda limit: abs(limit.closing_mm - decided_mm), default=None)
+    limit = deciding_limit(fruit.limits, fruit.short.closing_mm)
+    return {"fruit": fruit, "limit": limit, "curve": charts.curve(fruit, locale)}
 
 
 @router.get("/")

@@ -7,7 +7,7 @@ from fastapi import Depends, Request
 
 from hmi.web.context import Hmi
 from hmi.web.problem import Problem
-from hmi.web.roles import Right, least_role
+from hmi.web.roles import Right, Role, least_role
 from hmi.web.sessions import Caller
 from hmi.web.translation import Locale, preferred
 
@@ -81,6 +81,17 @@ def orders(right: Right) -> Callable[[Request], Awaitable[Caller]]:
 def _with_right(caller: Caller, right: Right) -> Caller:
     if not caller.may(right):
         raise Problem(403, "problem.not_allowed", role=least_role(right))
+    return caller
+
+
+def known(caller: Caller) -> Caller:
+    """Return a caller who is logged in, in whatever role.
+
+    Raises:
+        Problem: 403, nobody is.
+    """
+    if not caller.name:
+        raise Problem(403, "problem.not_allowed", role=Role.OPERATOR)
     return caller
 
 

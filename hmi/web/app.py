@@ -28,12 +28,13 @@ from hmi.web.problem import Problem
 from hmi.web.render import Renderer
 from hmi.web.security import SecurityMiddleware
 from hmi.web.sessions import Sessions
-from hmi.web.streams import stream_places
+from hmi.web.streams import MOST_STREAMS, RESERVED_STREAMS
 from hmi.web.user_store import UserStore
 from station.channel.messages import ChannelError, DeadlineError
 from station.channel.panel_live import PersonNoted
 from station.errors import StationError
 from station.messages.message import Message
+from station.serving.places import Places
 from station.settings.configuration import Configuration
 from station.settings.hmi import panel_endpoint
 
@@ -44,10 +45,7 @@ log = logging.getLogger(__name__)
 
 
 def make_context(site: Configuration, file: Path | None) -> Hmi:
-    """Make the parts that all pages use; the gateway is not entered yet.
-
-    Args:
-        file: it was read from; None for none.
+    """Make the parts that all pages use, with the file of the configuration, if any; the gateway is not entered yet.
 
     Raises:
         StationError: the user store cannot be read, or the endpoint is none.
@@ -65,7 +63,7 @@ def make_context(site: Configuration, file: Path | None) -> Hmi:
         pins=LoginRateLimiter(),
         assets=assets,
         renderer=renderer,
-        live=Live(parts(), renderer, gateway, boot, stream_places(settings.pages_per_address)),
+        live=Live(parts(), renderer, gateway, boot, Places(MOST_STREAMS, settings.pages_per_address, RESERVED_STREAMS)),
         boot=boot,
         ball_recipe=site.calibration.recipe,
         configuration_file=file,
@@ -117,8 +115,7 @@ async def _sweep(hmi: Hmi) -> None:
             await hmi.gateway.note(PersonNoted(person=actor_of(caller), what="idle"))
 
 
-async def _problem(request: Request, error: Exception) -> Response:
-    assert isinstance(error, Problem)  # noqa: S101 (what it is registered for)
+async def _problem(request: Request, error: Problem) -> Response:
     values = dict(error.values)
     locale = locale_of(request)
     if "role" in values:
@@ -126,8 +123,7 @@ async def _problem(request: Request, error: Exception) -> Response:
     return _problem_answer(request, error.status, locale.text(error.key, **values))
 
 
-async def _http(request: Request, error: Exception) -> Response:
-    assert isinstance(error, HTTPException)  # noqa: S101 (what it is registered for)
+async def _http(request: Request, error: HTTPException) -> Response:
     key = {404: "problem.not_found", 405: "problem.not_found"}.get(error.status_code)
     answer = _problem_answer(request, error.status_code, locale_of(request).text(key) if key else str(error.detail))
     answer.headers.update(error.headers or {})
@@ -143,8 +139,7 @@ def _methods(request: Request) -> set[str]:
     return {method for route in found for method in route.methods or ()}
 
 
-async def _bad_form(request: Request, error: Exception) -> Response:
-    assert isinstance(error, RequestValidationError)  # noqa: S101 (what it is registered for)
+async def _bad_form(request: Request, error: RequestValidationError) -> Response:
     if request.url.path.startswith("/api/"):
         # Without what was sent: it may be no JSON, as 1e999 is read as infinity.
         wrong = [{key: each[key] for key in ("type", "loc", "msg")} for each in error.errors()]
@@ -152,17 +147,14 @@ async def _bad_form(request: Request, error: Exception) -> Response:
     return _problem_answer(request, 400, locale_of(request).text("problem.bad_form"))
 
 
-async def _away(request: Request, error: Exception) -> Response:
+async def _away(request: Request, error: ChannelError) -> Response:
     """Answer that the station refused or did not answer, and state the result of an order where it is known."""
-    assert isinstance(error, ChannelError)  # noqa: S101 (what it is registered for)
-    if isinstance(error, DeadlineError):
-        return _problem_answer(request, 503, locale_of(request).text("problem.no_answer"), error.message)
-    return _problem_answer(request, 409, locale_of(request).text("problem.refused"), error.message)
+    status, key = (503, "problem.no_answer") if isinstance(error, DeadlineError) else (409, "problem.refused")
+    return _problem_answer(request, status, locale_of(request).text(key), error.message)
 
 
-async def _refused(request: Request, error: Exception) -> Response:
+async def _refused(request: Request, error: StationError) -> Response:
     """Answer with what this process itself found wrong: in the records, a recipe or a job."""
-    assert isinstance(error, StationError)  # noqa: S101 (what it is registered for)
     key = "problem.records" if isinstance(error, RecordsError | PanelBusyError) else "problem.refused"
     return _problem_answer(request, 409, locale_of(request).text(key), error.message)
 

@@ -3,7 +3,9 @@
 `./run messages` calls it. Extraction, reading and writing are Babel's.
 """
 
+import io
 import sys
+from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
@@ -15,7 +17,7 @@ from babel.messages.pofile import read_po, write_po
 
 from hmi.recipes.form import field_texts
 from hmi.web.folders import FOLDERS, HMI
-from hmi.web.translation import SOURCE
+from hmi.web.translation import SOURCE, forms_of
 from station.messages.message import fields
 from station.settings.hmi import Language
 
@@ -70,21 +72,13 @@ def _extracted(path: Path) -> dict[str, Forms]:
 
 def _is_text(english: str) -> bool:
     """Whether there is something to translate beside the values in braces."""
-    return any(letter.isalpha() for letter in english.format_map(_Blank()))
-
-
-class _Blank(dict[str, str]):
-    def __missing__(self, key: str) -> str:
-        return ""
+    return any(letter.isalpha() for letter in english.format_map(defaultdict(str)))
 
 
 def update(language: Language) -> list[Path]:
-    """Write a language's catalogues: new texts without a translation, those of a changed English marked as fuzzy.
+    """Write a language's catalogues: new texts untranslated, those of a changed English fuzzy; return what changed.
 
     Texts that the source does not have any more are left out.
-
-    Returns:
-        the files that were changed or removed.
     """
     changed = []
     for file, texts in sources().items():
@@ -118,14 +112,14 @@ def reworded(language: Language) -> Iterator[Finding]:
     for file, texts in sources().items():
         path = ROOT / file.format(language)
         for key, entry in _entries(path, language).items():
-            if key in texts and _forms(entry.id) != texts[key]:
+            if key in texts and forms_of(entry.id) != texts[key]:
                 yield Finding(path, key, f"its English is {texts[key][0]!r} now; run ./run messages, then review it")
 
 
 def _wrong(english: Forms | None, entry: Message | None) -> str:
     if english is None:
         return "the source does not have it any more"
-    forms = _forms(entry.string) if entry is not None else ()
+    forms = forms_of(entry.string) if entry is not None else ()
     if entry is None or not all(forms):
         return "has no translation"
     if entry.fuzzy:
@@ -143,10 +137,10 @@ def _merged(old: Mapping[str, Message], texts: Mapping[str, Forms], language: La
     for key, english in texts.items():
         entry = old.get(key)
         text = english[0] if len(english) == 1 else english
-        if entry is None or len(_forms(entry.id)) != len(english):
+        if entry is None or len(forms_of(entry.id)) != len(english):
             catalog.add(text, context=key)
             continue
-        changed = any(_forms(entry.string)) and _forms(entry.id) != english
+        changed = any(forms_of(entry.string)) and forms_of(entry.id) != english
         flags = {*entry.flags, "fuzzy"} if changed else entry.flags
         catalog.add(text, entry.string, context=key, flags=flags, user_comments=entry.user_comments)
     return catalog
@@ -155,14 +149,9 @@ def _merged(old: Mapping[str, Message], texts: Mapping[str, Forms], language: La
 def _written(catalog: Catalog, language: Language) -> bytes:
     """Return a catalogue's file: without dates and line numbers, so that it changes with its texts only."""
     header = "".join(f'"{line}\\n"\n' for line in _HEADER).format(language, catalog.plural_forms)
-    body = _Buffer()
+    body = io.BytesIO()
     write_po(body, catalog, width=0, no_location=True, omit_header=True)
-    return f'msgid ""\nmsgstr ""\n{header}\n'.encode() + bytes(body).strip() + b"\n"
-
-
-class _Buffer(bytearray):
-    def write(self, part: bytes) -> None:
-        self.extend(part)
+    return f'msgid ""\nmsgstr ""\n{header}\n'.encode() + body.getvalue().strip() + b"\n"
 
 
 def _entries(path: Path, language: Language) -> dict[str, Message]:
@@ -170,10 +159,6 @@ def _entries(path: Path, language: Language) -> dict[str, Message]:
         return {}
     with path.open("rb") as file:
         return {entry.context: entry for entry in read_po(file, locale=language) if entry.context}
-
-
-def _forms(text: object) -> Forms:
-    return tuple(map(str, text)) if isinstance(text, list | tuple) else (str(text),)
 
 
 def _orphans(language: Language) -> list[Path]:

@@ -78,10 +78,7 @@ class Gateway:
         return self.age_s is not None and self.age_s <= STALE_S
 
     async def request(self, request: ChannelMessage, reply: type[ReplyT], *, deadline_s: float = DEADLINE_S) -> ReplyT:
-        """Send a request to the station and return its answer.
-
-        Args:
-            deadline_s: how long to wait in all.
+        """Send a request to the station and return its answer, within the deadline in all.
 
         Raises:
             DeadlineError: no answer came in time; of an order it is unknown whether it was carried out.

@@ -14,13 +14,12 @@ from hmi.web.roles import RIGHTS, Right, Role
 from hmi.web.sessions import Caller
 from hmi.web.streams import Stream
 from hmi.web.translation import Locale
+from station.channel.panel_live import PanelState
 from station.serving.places import Places
 from station.settings.hmi import Language
 
 BEAT_S = 0.5
 """Period of a page's events if nothing changes."""
-
-
 AGAIN_MS = 1000
 """A page whose stream has ended, as because another page has its place, asks again after this time."""
 
@@ -33,6 +32,11 @@ class Part(NamedTuple):
     """Filled in anew when this is no longer equal to what it was; cheap."""
     values: Callable[[Gateway, Locale], Mapping[str, Any]]
     """The template's values, beside `may(right)`; `gateway.state` may be None, or old: the page shows its age."""
+
+
+def of_state(select: Callable[[PanelState], object]) -> Callable[[Gateway], object]:
+    """Make what a part depends on: a selection of the station's state, None until there is one."""
+    return lambda gateway: None if gateway.state is None else select(gateway.state)
 
 
 class Filled(NamedTuple):
@@ -64,11 +68,7 @@ class Live:
         return any(name not in self._parts for name in names)
 
     def part(self, name: str, locale: Locale, role: Role) -> Filled:
-        """Return a part's present content.
-
-        Args:
-            role: of the reader; an order within the part has no token, which the page's script fills in.
-        """
+        """Return a part's present content for a role; the page's script fills in the tokens of its orders."""
         part = self._parts[name]
         depends_on = part.depends_on(self._gateway)
         known = self._filled.get((name, locale.language, role))

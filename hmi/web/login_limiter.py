@@ -18,9 +18,6 @@ class LoginRateLimiter:
 
     An address where a person has logged in before counts that person's tries apart, and so does the station's own
     screen: wrong PINs from elsewhere do not delay a person there.
-
-    Args:
-        clock: monotonic.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -33,12 +30,7 @@ class LoginRateLimiter:
         return is_loopback(address) or any(where == address for _, where in self._logged_in)
 
     def wait_s(self, name: str, address: str) -> float:
-        """Return the delay of the next try; 0 for none.
-
-        Args:
-            name: the person's; empty for one who does not exist.
-            address: the browser's.
-        """
+        """Return the delay of the next try, 0 for none; the name is empty for who does not exist."""
         return max(self._wait_s(key) for key in self._keys(name, address))
 
     def tried(self, name: str, address: str) -> None:

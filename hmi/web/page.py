@@ -1,5 +1,6 @@
 """Page rendering: a page's template within the common layout."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from fastapi import Request
@@ -44,6 +45,13 @@ def show(request: Request, template: str, *, status: int = 200, **values: Any) -
     if caller.name and request.method == "GET":
         hmi.sessions.touch(caller.session)
     return answer
+
+
+def show_part(
+    hmi: Hmi, locale: Locale, template: str, values: Mapping[str, Any], headers: Mapping[str, str] | None = None
+) -> Response:
+    """Answer with a part of a page, for polling."""
+    return Response(hmi.renderer.render(template, locale, values), media_type="text/html", headers=headers)
 
 
 def give_session(request: Request, answer: Response, session: str) -> None:

@@ -27,10 +27,7 @@ log = logging.getLogger(__name__)
 
 
 async def serve(site: Configuration, file: Path | None) -> None:
-    """Serve the pages until SIGINT or SIGTERM.
-
-    Args:
-        file: it was read from; None for none.
+    """Serve the pages until SIGINT or SIGTERM, with the file of the configuration, if any.
 
     Raises:
         StationError: the address, a certificate or the user store cannot be used.

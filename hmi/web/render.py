@@ -31,10 +31,7 @@ class Renderer:
         self._environment.globals["static"] = assets.address
 
     def render(self, template: str, locale: Locale, values: Mapping[str, Any]) -> Markup:
-        """Render a template.
-
-        Args:
-            template: its file name.
+        """Render the template of a file name.
 
         Raises:
             jinja2.UndefinedError: a value is missing.

@@ -34,7 +34,6 @@ class SecurityMiddleware:
     """Refuses requests for a foreign host's name, from a foreign page, or too large, before they are read.
 
     Args:
-        names: the host names of this server.
         secure: whether TLS is served.
     """
 

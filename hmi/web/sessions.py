@@ -38,12 +38,7 @@ class _LoggedIn:
 
 
 class Sessions:
-    """Log-ins by browser; a restart of the process logs everybody out.
-
-    Args:
-        idle_s: a person is logged out after this time without a touch.
-        clock: monotonic.
-    """
+    """Log-ins by browser, ended after `idle_s` without a touch; a restart of the process logs everybody out."""
 
     def __init__(self, idle_s: float, clock: Callable[[], float] = time.monotonic) -> None:
         self._idle_s, self._clock = idle_s, clock
@@ -69,11 +64,7 @@ class Sessions:
             self._sessions[session].touched_s = self._clock()
 
     def log_in(self, name: str, role: Role) -> str:
-        """Log a person in.
-
-        Returns:
-            A new cookie; the one from before the log-in is not valid for this session.
-        """
+        """Log a person in, and return a new cookie; the one from before the log-in is not valid for this session."""
         session = self.new()
         self._sessions[session] = _LoggedIn(name, role, self._clock())
         while len(self._sessions) > MOST_SESSIONS:
@@ -89,11 +80,7 @@ class Sessions:
         self._sessions = OrderedDict((key, each) for key, each in self._sessions.items() if each.name != name)
 
     def sweep(self) -> list[Caller]:
-        """Remove expired sessions.
-
-        Returns:
-            Their callers.
-        """
+        """Remove expired sessions, and return their callers."""
         now_s = self._clock()
         idle = [key for key, each in self._sessions.items() if now_s - each.touched_s > self._idle_s]
         return [Caller(each.name, each.role, key) for key in idle if (each := self._sessions.pop(key))]

@@ -2,8 +2,6 @@
 
 import time
 
-from station.serving.places import Places
-
 MOST_STREAMS, RESERVED_STREAMS = 100, 100
 """Of all strangers together; of people who are logged in, and of known addresses."""
 
@@ -24,8 +22,3 @@ class Stream:
     def displace(self) -> None:
         """End: another page has the place."""
         self.displaced = True
-
-
-def stream_places(pages_per_address: int) -> Places[Stream]:
-    """Make the places of all pages' streams."""
-    return Places(MOST_STREAMS, pages_per_address, RESERVED_STREAMS)

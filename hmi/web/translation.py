@@ -49,15 +49,16 @@ def _read(files: Iterable[Path], language: Language) -> dict[str, tuple[str, ...
     found: dict[str, tuple[str, ...]] = {}
     for file in files:
         for entry in read_po(io.BytesIO(file.read_bytes()), locale=language):
-            english, forms = _forms(entry.id), tuple(form for form in _forms(entry.string) if form)
+            english, forms = forms_of(entry.id), tuple(form for form in forms_of(entry.string) if form)
             # A translation of an earlier English serves until it is reviewed, unless its values are others.
             if entry.context and forms and (not entry.fuzzy or fields(forms[-1]) == fields(english[-1])):
                 found[entry.context] = forms
     return found
 
 
-def _forms(text: object) -> tuple[str, ...]:
-    return tuple(text) if isinstance(text, list | tuple) else (str(text),)
+def forms_of(text: object) -> tuple[str, ...]:
+    """Return a catalogue's text as one form, or as one for each plural."""
+    return tuple(map(str, text)) if isinstance(text, list | tuple) else (str(text),)
 
 
 @cache

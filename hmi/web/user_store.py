@@ -18,9 +18,6 @@ from station.errors import StationError
 FILE_NAME = "people.json"
 MOST_PEOPLE = 200
 LONGEST_PIN = 12
-LEAST_DIGITS = {Role.OPERATOR: 4}
-_LEAST_DIGITS_ELSE = 6
-_UNUSED_PIN = "000000"
 
 log = logging.getLogger(__name__)
 
@@ -48,7 +45,7 @@ class _File(BaseModel):
 
 def least_digits(role: Role) -> int:
     """Return the minimum length of a role's PIN."""
-    return LEAST_DIGITS.get(role, _LEAST_DIGITS_ELSE)
+    return 4 if role is Role.OPERATOR else 6
 
 
 def pin_problem(pin: str, role: Role) -> str:
@@ -70,7 +67,7 @@ class UserStore:
         self.path = folder / FILE_NAME
         # OWASP's second choice for Argon2id: 19 MiB, two passes; more would disturb the cycle beside it.
         self._hasher = PasswordHasher(time_cost=2, memory_cost=19_456, parallelism=1)
-        self._unused = self._hasher.hash(_UNUSED_PIN)
+        self._unused = self._hasher.hash("000000")
         self._turn = threading.Lock()
         self.broken = ""
         """Read error of an existing file: then no log-in is possible, and it is no first start."""

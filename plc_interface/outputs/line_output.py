@@ -1,10 +1,9 @@
-"""Line outputs: the action on an outcome beside the registers, which is none or the reject gate."""
+"""Line outputs: the action on an outcome beside the registers, none or the reject gate; it neither waits nor raises."""
 
 import asyncio
 import logging
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Protocol
 
 from plc_interface.outputs.can.counts import ahead
 from plc_interface.outputs.can.errors import (
@@ -25,49 +24,6 @@ REJECTS_LANE = 1
 _RETRY_S = 0.05
 
 log = logging.getLogger(__name__)
-
-
-class LineOutput(Protocol):
-    """Interface of the outputs for outcomes. Nothing here may wait or raise."""
-
-    async def start(self) -> None:
-        """Start the outputs."""
-        ...
-
-    async def stop(self) -> None:
-        """Let the outputs go to their safe state."""
-        ...
-
-    def publish(self, outcome: Outcome) -> None:
-        """Act on an outcome. The same one may be published again after a restart."""
-        ...
-
-    def renew_health(self, valid_s: float) -> None:
-        """Declare the station healthy for so many seconds more."""
-        ...
-
-    def acknowledge_faults(self) -> None:
-        """Clear the faults whose cause is gone."""
-        ...
-
-    def encoder_count(self) -> int | None:
-        """Return the line's encoder count; None if the PLC's is to be used."""
-        ...
-
-    @property
-    def ready(self) -> bool:
-        """True if a fruit can be diverted; else no inspection is started."""
-        ...
-
-    @property
-    def faults(self) -> tuple[LineFault, ...]:
-        """Return the present faults."""
-        ...
-
-    @property
-    def counters(self) -> Mapping[str, int]:
-        """Return counters for the station's metrics, by names that the register map does not have."""
-        ...
 
 
 class NoOutput:
@@ -105,12 +61,7 @@ class RejectGate:
     """
 
     def __init__(self, settings: CanSettings, folder: Path) -> None:
-        """Restore the pending rejects of the run before.
-
-        Args:
-            settings: the bus, and the distance from the nest to the gate.
-            folder: of the journal.
-        """
+        """Restore the pending rejects of the run before, from the journal's folder."""
         self._io, self._distance = LineIo(settings), settings.distance_counts
         self._file = PendingRejectFile(folder)
         self._due = self._file.read()
@@ -132,11 +83,7 @@ class RejectGate:
         await self._io.stop()
 
     def publish(self, outcome: Outcome) -> None:
-        """Order a reject actuation for what is not PASS.
-
-        Args:
-            outcome: with the encoder's count at its trigger.
-        """
+        """Order a reject actuation for what is not PASS. An outcome may come again after a restart."""
         if outcome.outcome != "PASS" and outcome.sequence not in self._due:
             self._due[outcome.sequence] = at_count = self._io.count_at_gate(outcome.encoder)
             self._file.write(self._due)
@@ -174,11 +121,11 @@ class RejectGate:
 
     @property
     def ready(self) -> bool:
-        """True if what is not PASS would be diverted."""
+        """True if what is not PASS would be diverted; else no inspection is started."""
         return self._io.ready
 
     def encoder_count(self) -> int | None:
-        """Return the last count of the encoder on the bus."""
+        """Return the last count of the encoder on the bus; None if the PLC's is to be used."""
         count = self._io.encoder_count()
         return None if count is None else count.value
 
@@ -192,14 +139,14 @@ class RejectGate:
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """Return the bus's counters."""
+        """Return the bus's counters, by names that the register map does not have."""
         return {f"can_{name}": count for name, count in self._io.counters.items()}
 
 
-def make_output(settings: CanSettings, folder: Path) -> LineOutput:
-    """Make the outputs that the settings name.
+LineOutput = NoOutput | RejectGate
+"""What the interface gives every outcome to; a further output has the methods of `RejectGate`, and is added here."""
 
-    Args:
-        folder: the journal's, which holds the pending rejects.
-    """
+
+def make_output(settings: CanSettings, folder: Path) -> LineOutput:
+    """Make the outputs that the settings name; the journal's folder holds the pending rejects."""
     return RejectGate(settings, folder) if settings.enabled else NoOutput()

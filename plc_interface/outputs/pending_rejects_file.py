@@ -16,11 +16,7 @@ class PendingRejectFile:
     """One file, replaced as a whole. It belongs to the holder of the journal's lock."""
 
     def __init__(self, folder: Path) -> None:
-        """Prepare the file; nothing is read or written yet.
-
-        Args:
-            folder: the journal's.
-        """
+        """Prepare the file in the journal's folder; nothing is read or written yet."""
         self._path = folder / "shots.json"
 
     def read(self) -> dict[int, int]:
@@ -39,11 +35,7 @@ class PendingRejectFile:
         return {sequence: count for sequence, count in counts.items() if 1 <= sequence < _RANGE and 0 <= count < _RANGE}
 
     def write(self, counts: Mapping[int, int]) -> None:
-        """Replace the file. A failure is logged: the line goes on.
-
-        Args:
-            counts: as `read` returns them.
-        """
+        """Replace the file by counts as `read` returns them. A failure is logged: the line goes on."""
         try:
             write_atomically(self._path, json.dumps(counts).encode())
         except OSError as error:

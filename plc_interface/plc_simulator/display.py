@@ -35,12 +35,7 @@ Sketch = Callable[[int], str]
 
 
 class LineDisplay:
-    """Display of a line's fruit.
-
-    Args:
-        summary: of the line, updated while it runs.
-        sketch: draws each result's curve, if the caller can read it.
-    """
+    """Display of a line's fruit and summary; `sketch` draws each result's curve, if the caller can read it."""
 
     def __init__(self, console: Console, summary: Summary, sketch: Sketch = lambda _: "") -> None:
         self._console, self._summary, self._sketch = console, summary, sketch
@@ -60,12 +55,7 @@ class LineDisplay:
             self._live.stop()
 
     def passed(self, passage: Passage, fruit: LaidFruit) -> None:
-        """Show a decided fruit.
-
-        Args:
-            passage: the line's decision.
-            fruit: the fruit's true state.
-        """
+        """Show a decided fruit: the line's decision and the fruit's true state."""
         row = _row(passage, fruit, self._sketch(passage.sequence) if passage.sequence else "")
         self._rows.append((row, _STYLES.get(passage.decision, _OTHERWISE)))
         if self._live:
@@ -74,11 +64,7 @@ class LineDisplay:
             self._print(row)
 
     def show_activity(self, what: str) -> None:
-        """Show the line's activity when it changes.
-
-        Args:
-            what: one sentence, or the program's stage.
-        """
+        """Show the line's activity, one sentence or the program's stage, when it changes."""
         if what != self._activity:
             self._activity = what
             self._refresh()

@@ -26,21 +26,12 @@ class LineFault(StrEnum):
 
 
 class FaultPlan:
-    """Schedule of faults: every n-th fruit has one, in turn.
-
-    Args:
-        faults: in this order; none if empty.
-        every: one fruit in so many has a fault.
-    """
+    """Schedule of faults: every n-th fruit has one, in turn, in this order; none if there are none."""
 
     def __init__(self, faults: Sequence[LineFault] = (), every: int = 3) -> None:
         self._faults, self._every = tuple(faults), every
 
     def of_fruit(self, number: int) -> LineFault | None:
-        """Return the fault of a fruit.
-
-        Args:
-            number: counted from 1.
-        """
+        """Return the fault of a fruit, counted from 1."""
         turn, rest = divmod(number, self._every)
         return self._faults[(turn - 1) % len(self._faults)] if self._faults and rest == 0 else None

@@ -33,11 +33,7 @@ class LaidFruit:
 
 
 class Grader:
-    """Upstream grader: measures the length of every fruit, with an error drawn evenly from its bounds.
-
-    Args:
-        seed: the same gives the same errors.
-    """
+    """Upstream grader: measures the length of every fruit, with an error drawn by a seed evenly from its bounds."""
 
     def __init__(self, seed: int) -> None:
         self._random = random.Random(seed)  # noqa: S311 (a simulation)

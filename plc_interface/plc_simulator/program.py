@@ -108,11 +108,7 @@ class _Fruit:
 
 
 class LineProgram:
-    """A PLC's program for one station.
-
-    Args:
-        lot: latched before the first fruit if it is not empty; at most 32 ASCII characters.
-    """
+    """A PLC's program for one station; a lot of at most 32 ASCII characters is latched before the first fruit."""
 
     def __init__(self, plan: FaultPlan | None = None, lot: str = "") -> None:
         self.stage = Stage.CLAIMING

@@ -47,14 +47,7 @@ class Scanner:
             self._client = None
 
     async def exchange(self, outputs: Mapping[str, int | str]) -> dict[str, int | float | str] | None:
-        """Write the control block and read status, result and alarms.
-
-        Args:
-            outputs: every register of the control block, by name.
-
-        Returns:
-            The values read, by name; None if the exchange failed, see `trouble`.
-        """
+        """Write the control block; return status, result and alarms, or None with the error in `trouble`."""
         try:
             try:
                 words = await self._exchanged(self._laid_out(outputs))

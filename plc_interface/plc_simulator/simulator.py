@@ -10,6 +10,8 @@ from plc_interface.plc_simulator.program import Decision, LineProgram, Passage, 
 from plc_interface.plc_simulator.scan import Scanner
 from plc_interface.registers.alarms import active_alarms
 
+_ENCODER_COUNTS_PER_S = 1000.0
+
 
 @dataclass(frozen=True, slots=True)
 class Pace:
@@ -18,7 +20,6 @@ class Pace:
     scan_s: float = 0.01
     every_s: float = 0.0
     """Time from one fruit's arrival to the next. One that the nest is not free for waits, and the next behind it."""
-    encoder_counts_per_s: float = 1000.0
 
 
 @dataclass(slots=True)
@@ -36,21 +37,8 @@ class Summary:
         """Number of decided fruit."""
         return sum(self.decided.values())
 
-    def waited(self, seconds: float) -> None:
-        """Note that a fruit has come into the nest.
-
-        Args:
-            seconds: for how long it waited before.
-        """
-        self.waits_s.append(seconds)
-
     def add(self, passage: Passage, fruit: LaidFruit) -> None:
-        """Count one fruit.
-
-        Args:
-            passage: the line's decision.
-            fruit: the fruit's true state.
-        """
+        """Count one fruit by the line's decision and its true state."""
         self.decided[passage.decision] += 1
         self.damaged_passed += fruit.damaged is True and not passage.diverted
         self.sound_diverted += fruit.damaged is False and passage.diverted
@@ -68,10 +56,7 @@ class LineSimulator:
         self.summary = Summary()
 
     async def run(self, count: int | None) -> Summary:
-        """Run until so many fruits are decided and the last result is acknowledged.
-
-        Args:
-            count: of fruits; None for until cancelled.
+        """Run until `count` fruits are decided and the last result is acknowledged; None for until cancelled.
 
         Raises:
             StationError: the nest cannot be filled.
@@ -84,9 +69,9 @@ class LineSimulator:
             wanted = count is None or self.summary.fruits < count
             if fruit is None and wanted and self._program.free and now_s >= next_arrival_s:
                 fruit = await self._nest.arrive()
-                self.summary.waited(now_s - next_arrival_s if self._pace.every_s else 0.0)
+                self.summary.waits_s.append(now_s - next_arrival_s if self._pace.every_s else 0.0)
                 next_arrival_s = next_arrival_s + self._pace.every_s if self._pace.every_s else now_s
-            encoder = int(now_s * self._pace.encoder_counts_per_s) % 2**32
+            encoder = int(now_s * _ENCODER_COUNTS_PER_S) % 2**32
             outputs = self._program.scan(
                 inputs,
                 now_s,

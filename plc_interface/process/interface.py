@@ -12,18 +12,18 @@ from plc_interface.handshake import events as ev
 from plc_interface.handshake.machine import next_due_s, step
 from plc_interface.handshake.modes import Link
 from plc_interface.handshake.state import restarted
-from plc_interface.handshake.view import Value, line, view
+from plc_interface.handshake.view import line, view
 from plc_interface.outputs.line_output import LineOutput
 from plc_interface.process.journal_file import JournalFile
 from plc_interface.process.station_link import StationLink, now
 from plc_interface.registers.map import BY_NAME
+from plc_interface.registers.register import Value
 from plc_interface.registers.values import formatted_registers
 from plc_interface.server.image import RegisterImage
 from plc_interface.server.peer import Peer
 from plc_interface.server.statistics import Statistics
 from plc_interface.server.write_lock import WriterChange
 from station.channel.line import Line, LineFault
-from station.messages.message import Message
 from station.settings.plc import HandshakeSettings
 
 _CONTROL = BY_NAME["control"]
@@ -38,13 +38,7 @@ class Interface:
     def __init__(
         self, settings: HandshakeSettings, endpoint: str, image: RegisterImage, journal: JournalFile, output: LineOutput
     ) -> None:
-        """Continue from the journal.
-
-        Args:
-            endpoint: where the station answers.
-            journal: of the run before.
-            output: receives every outcome.
-        """
+        """Continue from the journal of the run before; the output receives every outcome."""
         self._settings, self._image, self._journal, self._output = settings, image, journal, output
         self._loop = asyncio.get_running_loop()
         self._timer: asyncio.TimerHandle | None = None
@@ -106,9 +100,9 @@ class Interface:
         self._publish()
         for action in actions:
             self._carry_out(action)
-        if isinstance(event, ev.Beat) and self._state.link is Link.UP and event.station.healthy:
-            self._output.renew_health(self._settings.station_lost_after_s)
         if isinstance(event, ev.Beat):
+            if self._state.link is Link.UP and event.station.healthy:
+                self._output.renew_health(self._settings.station_lost_after_s)
             self._report_output()
         self._wake_when_due()
 
@@ -144,7 +138,8 @@ class Interface:
         }
 
     def _line(self) -> Line:
-        faults = (*_journal_fault(self._journal.trouble), *self._output.faults)
+        trouble = self._journal.trouble
+        faults = (*(() if trouble is None else (LineFault(part="journal", what=trouble),)), *self._output.faults)
         counters = {**self._server_counts(), **self._output.counters}
         state, station = line(self._state, counters, faults), self._state.station
         if station is None or not station.registers_wanted:
@@ -156,10 +151,6 @@ class Interface:
             self._timer.cancel()
         due_s = next_due_s(self._state)
         self._timer = None if due_s is None else self._loop.call_at(due_s, lambda: self.feed(ev.Tick(now())))
-
-
-def _journal_fault(trouble: Message | None) -> tuple[LineFault, ...]:
-    return () if trouble is None else (LineFault(part="journal", what=trouble),)
 
 
 def _ipv4(peer: Peer | None) -> int:

@@ -32,10 +32,7 @@ class JournalFile:
     """
 
     def __init__(self, folder: Path) -> None:
-        """Create the folder and take the lock.
-
-        Args:
-            folder: of this file alone.
+        """Create the folder, which is of this file alone, and take the lock.
 
         Raises:
             StationError: the folder cannot be written, or another interface runs there.
@@ -75,7 +72,7 @@ class JournalFile:
             return Journal(boots=int(time.time()) % 2**16)  # a number other than the last one
 
     def write(self, journal: Journal, *, durable: bool) -> None:
-        """Replace the file. A failure is logged and stored in `trouble`: the line goes on.
+        """Replace the file; a failure is logged and stored in `trouble`: the line goes on.
 
         Args:
             durable: wait for the disk, so that it outlives a loss of power too.

@@ -11,14 +11,11 @@ log = logging.getLogger(__name__)
 
 
 def request_real_time_priority() -> bool:
-    """Freeze the garbage collector's objects and request real-time priority. Call once all is set up.
+    """Freeze the garbage collector's objects and request real-time priority, once all is set up; False if refused.
 
     Needs CAP_SYS_NICE (systemd: `CPUSchedulingPolicy=rr`, or `AmbientCapabilities=CAP_SYS_NICE`); without it a log line
     reports that and the process goes on as it is. Processes that it starts do not inherit the priority, and Linux
     leaves 5 % of each second to the others (`sched_rt_runtime_us`).
-
-    Returns:
-        Whether the process has real-time priority now.
     """
     gc.collect()
     gc.freeze()

@@ -1,6 +1,7 @@
 """The handshake's requests to the station over the channel."""
 
 import asyncio
+import contextlib
 import logging
 import time
 from collections import deque
@@ -50,13 +51,7 @@ class StationLink:
     def __init__(
         self, endpoint: str, settings: HandshakeSettings, feed: Callable[[ev.Event], None], line: Callable[[], Line]
     ) -> None:
-        """Prepare the link; nothing is sent before `start`.
-
-        Args:
-            endpoint: the station's.
-            feed: receives every answer as an event.
-            line: sent to the station with each beat.
-        """
+        """Prepare the link; `feed` gets every answer, and `line` is sent with each beat from `start` on."""
         self._settings, self._feed, self._line = settings, feed, line
         self._client = ChannelClient(endpoint, "the station")
         self._notes: deque[do.NotifyPublished | do.NotifyAcknowledged] = deque()
@@ -118,11 +113,9 @@ class StationLink:
             else:
                 self._logged = ""
                 self._feed(ev.Beat(now(), state))
-            try:
+            with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(period_s):
                     await self._beat_now.wait()
-            except TimeoutError:
-                pass
 
     async def _begin(self, action: do.RequestBegin) -> None:
         request = Begin(
@@ -143,12 +136,13 @@ class StationLink:
     async def _outcome(self, action: do.RequestOutcome) -> None:
         try:
             outcome = await self._awaited(action.sequence, time.monotonic() + action.within_s + OUTCOME_GRACE_S)
+            event = ev.OutcomeReceived(now(), outcome)
         except ChannelError as error:
-            self._forget_outcome(action.sequence)
-            self._feed(ev.OutcomeFailed(now(), action.sequence, str(error)))
-        else:
-            self._forget_outcome(action.sequence)
-            self._feed(ev.OutcomeReceived(now(), outcome))
+            event = ev.OutcomeFailed(now(), action.sequence, str(error))
+        if self._outcomes.get(action.sequence) is asyncio.current_task():
+            del self._outcomes[action.sequence]
+        self._feed(event)
+        if isinstance(event, ev.OutcomeReceived):
             self._beat_now.set()  # the station may be ready for the next trigger at once
 
     async def _awaited(self, sequence: int, ends_s: float) -> Outcome:
@@ -162,10 +156,6 @@ class StationLink:
             except DeadlineError:
                 if left_s <= _ASK_AGAIN_S:
                     raise
-
-    def _forget_outcome(self, sequence: int) -> None:
-        if self._outcomes.get(sequence) is asyncio.current_task():
-            del self._outcomes[sequence]
 
     async def _open(self, action: do.RequestOpen) -> None:
         try:

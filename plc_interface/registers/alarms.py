@@ -12,19 +12,11 @@ _BITS = 32
 
 
 def alarm_values(active: int) -> dict[str, int]:
-    """Return the values of the alarm registers by name.
-
-    Args:
-        active: bit n is set while the alarm with number n + 1 is active.
-    """
+    """Return the alarm registers' values by name; bit n of `active` is the alarm with number n + 1."""
     return {register.name: active >> _BITS * place & register.mask for place, register in enumerate(ALARMS)}
 
 
 def active_alarms(values: Mapping[str, Any]) -> tuple[int, ...]:
-    """Return the numbers of the active alarms, ascending.
-
-    Args:
-        values: of the alarm registers, by name.
-    """
+    """Return the numbers of the active alarms, ascending, from the alarm registers' values by name."""
     active = sum(int(values[register.name]) << _BITS * place for place, register in enumerate(ALARMS))
     return tuple(place + 1 for place in range(active.bit_length()) if active >> place & 1)

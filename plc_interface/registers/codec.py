@@ -5,7 +5,7 @@ import struct
 from collections.abc import Sequence
 from enum import StrEnum
 
-from plc_interface.registers.register import Kind, Register
+from plc_interface.registers.register import FORMATS, Kind, Register
 from station.errors import BadInputError
 
 
@@ -20,18 +20,6 @@ class WordOrder(StrEnum):
 
 class RegisterValueError(BadInputError):
     """A value that a register cannot hold, or must not."""
-
-
-_FORMATS = {
-    Kind.U16: ">H",
-    Kind.BITS: ">H",
-    Kind.I16: ">h",
-    Kind.U32: ">I",
-    Kind.BITS32: ">I",
-    Kind.I32: ">i",
-    Kind.U64: ">Q",
-    Kind.F32: ">f",
-}
 
 
 def encode(register: Register, value: float | str | None, order: WordOrder = WordOrder.HIGH_FIRST) -> tuple[int, ...]:
@@ -53,7 +41,7 @@ def encode(register: Register, value: float | str | None, order: WordOrder = Wor
     if register.kind is Kind.TEXT:
         return _encode_text(register, value)
     try:
-        raw = struct.pack(_FORMATS[register.kind], value)
+        raw = struct.pack(FORMATS[register.kind], value)
     except (struct.error, OverflowError) as error:
         message = f"{register.name} is of type {register.kind} and cannot hold {value!r}"
         raise RegisterValueError(message) from error
@@ -76,7 +64,7 @@ def decode(register: Register, words: Sequence[int], order: WordOrder = WordOrde
     if register.kind is Kind.TEXT:
         return _decode_text(register, words)
     ordered = words if order is WordOrder.HIGH_FIRST else words[::-1]
-    return struct.unpack(_FORMATS[register.kind], struct.pack(f">{len(ordered)}H", *ordered))[0]
+    return struct.unpack(FORMATS[register.kind], struct.pack(f">{len(ordered)}H", *ordered))[0]
 
 
 def is_invalid(register: Register, value: float | str) -> bool:

@@ -38,40 +38,29 @@ with another copy of the sequence, so that a torn read of it is found as well.
 
 RO, RW = Access.READ_ONLY, Access.READ_WRITE
 U16_MAX, U32_MAX, U64_MAX = 2**16 - 1, 2**32 - 1, 2**64 - 1
-NO_AREA_I32 = -(2**31)
-NO_CLOSING_I16 = -(2**15)
-LOT_CHARACTERS = 32
 QUEUE_PLACES = 8
 
 
-def _number(name: str, address: int, kind: Kind, access: Access, unit: str, low: float, high: float, meaning: str,
-            invalid: float | None = None) -> Register:  # fmt: skip
-    return Register(name, address, kind, access, unit, low, high, meaning, invalid=invalid)
-
-
 def _u16(name: str, address: int, meaning: str, access: Access = RO, unit: str = "", high: int = U16_MAX) -> Register:
-    return _number(name, address, Kind.U16, access, unit, 0, high, meaning)
+    return Register(name, address, Kind.U16, access, unit, 0, high, meaning)
 
 
 def _u32(name: str, address: int, meaning: str, access: Access = RO, unit: str = "") -> Register:
-    return _number(name, address, Kind.U32, access, unit, 0, U32_MAX, meaning)
+    return Register(name, address, Kind.U32, access, unit, 0, U32_MAX, meaning)
 
 
 CONTROL = (
     Register("control", 0, Kind.BITS, RW, "", None, None, "Requests of the PLC", bits=CONTROL_BITS),
     _u16("trigger_id", 1, "The PLC's number of the fruit to inspect, 1 to 65535, other than the one before", RW),
-    _u32("acknowledged_sequence", 2, "The sequence of the published result, once the PLC has taken it",
-         RW),
+    _u32("acknowledged_sequence", 2, "The sequence of the published result, once the PLC has taken it", RW),
     Register("command_code", 4, Kind.U16, RW, "", 0, len(CommandName), "Command to execute", codes=COMMAND_CODES),
     _u16("command_argument", 5, "The command's argument", RW),
     _u16("command_sequence", 6, "The PLC's number of the command, echoed with its result", RW),
     _u16("plc_heartbeat", 7, "Changed by the PLC in each scan; the interface disarms if it stops changing after that",
          RW),
     _u32("encoder", 8, "The line's encoder at the trigger, given back with the result", RW, "counts"),
-    Register("lot", 10, Kind.TEXT, RW, "", None, None, "The lot's id, taken by latch_lot",
-             text_words=LOT_CHARACTERS // 2),
-    Register("write_key", 26, Kind.U16, RW, "", 0, U16_MAX, "Claims or releases the write lock",
-             codes=WRITE_KEY_CODES),
+    Register("lot", 10, Kind.TEXT, RW, "", None, None, "The lot's id, taken by latch_lot", text_words=16),
+    Register("write_key", 26, Kind.U16, RW, "", 0, U16_MAX, "Claims or releases the write lock", codes=WRITE_KEY_CODES),
     _u16("fruit_length_mm_x10", 27, "Length of the fruit from stem to tip, taken with the trigger and used up by it; "
          "0: not given", RW, "mm/10"),
     _u16("size_class", 28, "The grader's size class of the fruit, taken and used up likewise; 0: not given", RW),
@@ -108,19 +97,21 @@ RESULT = (
     _u16("result_trigger_id", 130, "The trigger id that this is the result of"),
     Register("result_flags", 131, Kind.BITS, RO, "", None, None, "About the result", bits=FLAG_BITS),
     Register("result_reasons", 132, Kind.BITS32, RO, "", None, None, "Why it is not PASS", bits=REASON_BITS),
-    _number("result_area_mm2_x100", 134, Kind.I32, RO, "mm²/100", 0, 2**31 - 1,
-            "The deformed area that decided; 0x80000000: none", NO_AREA_I32),
-    _number("result_area_mm2", 136, Kind.F32, RO, "mm²", 0, 3.4e38, "The same; NaN: none", math.nan),
-    _number("result_area_px", 138, Kind.U32, RO, "px", 0, U32_MAX - 1, "The same; 0xFFFFFFFF: none", U32_MAX),
-    _number("result_closing_mm_x100", 140, Kind.I16, RO, "mm/100", -(2**15) + 1, 2**15 - 1,
-            "Closing since first contact where that area was measured; 0x8000: none", NO_CLOSING_I16),
-    _number("result_confidence_pct", 141, Kind.U16, RO, "%", 0, 100,
-            "Confidence of the measurement; 0xFFFF: none", U16_MAX),
+    Register("result_area_mm2_x100", 134, Kind.I32, RO, "mm²/100", 0, 2**31 - 1,
+             "The deformed area that decided; 0x80000000: none", invalid=-(2**31)),
+    Register("result_area_mm2", 136, Kind.F32, RO, "mm²", 0, 3.4e38, "The same; NaN: none",
+             invalid=math.nan),
+    Register("result_area_px", 138, Kind.U32, RO, "px", 0, U32_MAX - 1, "The same; 0xFFFFFFFF: none",
+             invalid=U32_MAX),
+    Register("result_closing_mm_x100", 140, Kind.I16, RO, "mm/100", -(2**15) + 1, 2**15 - 1,
+             "Closing since first contact where that area was measured; 0x8000: none", invalid=-(2**15)),
+    Register("result_confidence_pct", 141, Kind.U16, RO, "%", 0, 100,
+             "Confidence of the measurement; 0xFFFF: none", invalid=U16_MAX),
     _u16("result_recipe", 142, "Number of the recipe used for this result"),
     Register("result_outcome", 143, Kind.U16, RO, "", 0, 3, "The outcome", codes=OUTCOME_CODES),
     _u32("result_recipe_checksum", 144, "CRC-32 of that recipe's canonical JSON"),
     _u32("result_duration_ms", 146, "Time from trigger to outcome, by the monotonic clock", RO, "ms"),
-    _number("result_ended_utc_ms", 148, Kind.U64, RO, "ms", 0, U64_MAX, "End of the inspection, UTC since 1970-01-01"),
+    Register("result_ended_utc_ms", 148, Kind.U64, RO, "ms", 0, U64_MAX, "End of the inspection, UTC since 1970-01-01"),
     _u32("result_encoder", 152, "The line's encoder at the trigger, as given with it or read over CAN", RO, "counts"),
     _u32("result_lot_checksum", 154, "CRC-32 of the lot id of this inspection"),
     _u32("result_sequence_again", 156, "As result_sequence: where they differ the block was read torn, read again"),
@@ -152,21 +143,21 @@ COUNTERS = (
     _u32("count_bad_requests", 218, "Requests answered with an exception, and malformed ones"),
     _u32("count_refused_connections", 220, "Connections refused or closed by a limit"),
     _u32("counters_epoch", 222, "Raised with each reset of the counters"),
-    _number("counters_reset_utc_ms", 224, Kind.U64, RO, "ms", 0, U64_MAX, "The last reset, UTC since 1970-01-01"),
+    Register("counters_reset_utc_ms", 224, Kind.U64, RO, "ms", 0, U64_MAX, "The last reset, UTC since 1970-01-01"),
 )
 """They wrap round at 2³²."""
 
 IDENTITY = (
     _u16("map_version", 240, "Version of this map"),
-    _number("reference_u16", 241, Kind.U16, RO, "", 0, U16_MAX, "Always 0x1234 = 4660: the address is right"),
+    Register("reference_u16", 241, Kind.U16, RO, "", 0, U16_MAX, "Always 0x1234 = 4660: the address is right"),
     _u32("map_checksum", 242, "CRC-32 of this map's canonical table"),
     _u32("reference_u32", 244, "Always 0x12345678 = 305419896: the word order is right"),
-    _number("reference_f32", 246, Kind.F32, RO, "", -3.4e38, 3.4e38, "Always 12.34: the word order is right"),
-    _number("reference_i16", 248, Kind.I16, RO, "", -(2**15), 2**15 - 1, "Always -2: the sign is right"),
+    Register("reference_f32", 246, Kind.F32, RO, "", -3.4e38, 3.4e38, "Always 12.34: the word order is right"),
+    Register("reference_i16", 248, Kind.I16, RO, "", -(2**15), 2**15 - 1, "Always -2: the sign is right"),
     _u16("queue_places", 249, "Results that can wait in all"),
     Register("reference_text", 250, Kind.TEXT, RO, "", None, None, "Always ABCD: the byte order is right",
              text_words=2),
-    _number("reference_u64", 252, Kind.U64, RO, "", 0, U64_MAX, "Always 0x0123456789ABCDEF"),
+    Register("reference_u64", 252, Kind.U64, RO, "", 0, U64_MAX, "Always 0x0123456789ABCDEF"),
     Register("software_version", 256, Kind.TEXT, RO, "", None, None, "Version of the software", text_words=8),
     _u32("plc_heartbeat_timeout_ms", 264, "After this time without a change the PLC counts as lost", RO, "ms"),
     _u32("writer_lease_ms", 266, "After this time without a write another client may write", RO, "ms"),

@@ -1,5 +1,6 @@
 """Register definition: access, kind, flags, codes."""
 
+import struct
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -29,17 +30,20 @@ class Kind(StrEnum):
     BITS32 = "bits32"
 
 
-WORDS = {
-    Kind.U16: 1,
-    Kind.I16: 1,
-    Kind.BITS: 1,
-    Kind.U32: 2,
-    Kind.I32: 2,
-    Kind.F32: 2,
-    Kind.BITS32: 2,
-    Kind.U64: 4,
+FORMATS = {
+    Kind.U16: ">H",
+    Kind.BITS: ">H",
+    Kind.I16: ">h",
+    Kind.U32: ">I",
+    Kind.BITS32: ">I",
+    Kind.I32: ">i",
+    Kind.U64: ">Q",
+    Kind.F32: ">f",
 }
-"""Registers of one value, for every kind but TEXT."""
+"""Of `struct`, high word first, for every kind but TEXT."""
+_WORDS = {kind: struct.calcsize(layout) // 2 for kind, layout in FORMATS.items()}
+Value = int | float | str | None
+"""A register's value; None where there is none and the register has a value that says so."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +89,7 @@ class Register:
     @property
     def words(self) -> int:
         """Number of registers of the value."""
-        return self.text_words if self.kind is Kind.TEXT else WORDS[self.kind]
+        return self.text_words if self.kind is Kind.TEXT else _WORDS[self.kind]
 
     @property
     def end(self) -> int:
@@ -99,17 +103,12 @@ class Register:
 
     def bit(self, name: str) -> int:
         """Return the mask of one flag; KeyError for an unknown name."""
-        for bit in self.bits:
-            if bit.name == name:
-                return 1 << bit.number
-        raise KeyError(name)
+        return self.flags((name,))
 
     def flags(self, names: Iterable[str]) -> int:
         """Return the value in which exactly these flags are set; KeyError for an unknown name."""
-        value = 0
-        for name in names:
-            value |= self.bit(name)
-        return value
+        numbers = {bit.name: bit.number for bit in self.bits}
+        return sum(1 << numbers[name] for name in frozenset(names))
 
     def names(self, value: int) -> frozenset[str]:
         """Return the flags that are set in a value; those without a meaning are left out."""
@@ -117,7 +116,4 @@ class Register:
 
     def code(self, name: str) -> int:
         """Return the value of an enumeration's name; KeyError for an unknown name."""
-        for value, code in self.codes.items():
-            if code.name == name:
-                return value
-        raise KeyError(name)
+        return {code.name: value for value, code in self.codes.items()}[name]

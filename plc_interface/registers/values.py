@@ -3,18 +3,12 @@
 from collections.abc import Callable
 
 from plc_interface.registers.map import REGISTERS
-from plc_interface.registers.register import Access, Register
+from plc_interface.registers.register import Access, Register, Value
 from station.channel.line import RegisterView
-
-Value = int | float | str | None
 
 
 def formatted_registers(value: Callable[[str], Value]) -> tuple[RegisterView, ...]:
-    """Return every register of the map with its formatted value, in the order of the addresses.
-
-    Args:
-        value: returns a register's value by its name; None if there is none.
-    """
+    """Return every register with its formatted value, None being "none", in the order of the addresses."""
     return tuple(
         RegisterView(
             name=register.name,

@@ -18,11 +18,7 @@ class AllowList:
 
 
 def plain_address(address: str) -> str:
-    """Return a peer's address without its zone, and as IPv4 if it is IPv4 mapped into IPv6.
-
-    Args:
-        address: as a socket gives it.
-    """
+    """Return a socket's peer address without its zone, and as IPv4 if it is IPv4 mapped into IPv6."""
     parsed = ipaddress.ip_address(address.partition("%")[0])
     mapped = parsed.ipv4_mapped if isinstance(parsed, ipaddress.IPv6Address) else None
     return str(mapped or parsed)

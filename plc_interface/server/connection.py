@@ -53,12 +53,7 @@ class Connection(asyncio.BufferedProtocol):
         self._end(f"its connection was lost: {exc}" if exc else "it has disconnected")
 
     def drop(self, trouble: Trouble | None = None, why: str = "") -> None:
-        """Close the connection at once.
-
-        Args:
-            trouble: its counter, if any.
-            why: one sentence for the log.
-        """
+        """Close the connection at once; count and log the trouble, if any, with one sentence why."""
         if self._ended:
             return
         if trouble is not None:

@@ -92,12 +92,7 @@ class ConnectionManager:
         return peer
 
     def gone(self, peer: Peer | None, why: str) -> None:
-        """Remove a client.
-
-        Args:
-            peer: the client, or None if it was refused.
-            why: one sentence for the log; empty if the log has it already.
-        """
+        """Remove a client, None if it was refused; `why` is a sentence for the log, empty if the log has it already."""
         if peer is None or self._members.pop(peer, None) is None:
             return
         if why:

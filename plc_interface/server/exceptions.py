@@ -1,6 +1,7 @@
 """Failed requests: exception codes, and their counters."""
 
 from enum import IntEnum, StrEnum
+from functools import partial
 
 
 class ExceptionCode(IntEnum):
@@ -53,16 +54,9 @@ class MalformedFrameError(Exception):
     """Bytes that are no Modbus TCP: the start of the next request is unknown, so the connection has to end."""
 
 
-def illegal_function(why: str) -> RequestError:
-    """Exception 01."""
-    return RequestError(ExceptionCode.ILLEGAL_FUNCTION, Trouble.ILLEGAL_FUNCTION, why)
-
-
-def illegal_address(why: str) -> RequestError:
-    """Exception 02."""
-    return RequestError(ExceptionCode.ILLEGAL_ADDRESS, Trouble.ILLEGAL_ADDRESS, why)
-
-
-def illegal_value(why: str) -> RequestError:
-    """Exception 03."""
-    return RequestError(ExceptionCode.ILLEGAL_VALUE, Trouble.ILLEGAL_VALUE, why)
+illegal_function = partial(RequestError, ExceptionCode.ILLEGAL_FUNCTION, Trouble.ILLEGAL_FUNCTION)
+"""Exception 01, by its reason."""
+illegal_address = partial(RequestError, ExceptionCode.ILLEGAL_ADDRESS, Trouble.ILLEGAL_ADDRESS)
+"""Exception 02."""
+illegal_value = partial(RequestError, ExceptionCode.ILLEGAL_VALUE, Trouble.ILLEGAL_VALUE)
+"""Exception 03."""

@@ -22,10 +22,7 @@ OBJECTS = {
 
 
 def identify(message: bytes) -> bytes:
-    """Return the response to a request for the identification.
-
-    Args:
-        message: from the function code on.
+    """Return the response to a request for the identification, from the function code on.
 
     Raises:
         RequestError: 01 for another interface than 14, 02 for an unknown object, 03 for a malformed one.

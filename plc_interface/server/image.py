@@ -5,11 +5,8 @@ from collections.abc import Mapping
 
 from plc_interface.registers.codec import RegisterValueError, WordOrder, decode, encode, problem
 from plc_interface.registers.map import BY_NAME, MAP_VERSION, QUEUE_PLACES, REFERENCES, REGISTERS, map_checksum
-from plc_interface.registers.register import Access, Kind, Register
+from plc_interface.registers.register import Access, Kind, Register, Value
 from plc_interface.server.exceptions import illegal_address, illegal_value
-
-Value = int | float | str | None
-"""A register's value; None where there is none and the register has a value that says so."""
 
 _END = REGISTERS[-1].end
 _AT = {register.address: register for register in REGISTERS}
@@ -34,11 +31,7 @@ class RegisterImage:
     """
 
     def __init__(self, order: WordOrder = WordOrder.HIGH_FIRST) -> None:
-        """Start with zeros and empty texts, except the reference values and the map's own version.
-
-        Args:
-            order: of the words of 32- and 64-bit values.
-        """
+        """Start with zeros and empty texts, except the reference values and the map's own version."""
         self._order = order
         self._wire = bytearray(2 * _END)
         self._values: dict[str, Value] = {
@@ -54,10 +47,7 @@ class RegisterImage:
         )
 
     def commit(self, values: Mapping[str, Value]) -> None:
-        """Set registers by name, all at once or none.
-
-        Args:
-            values: by the map's names; None for a register's own "there is none".
+        """Set registers by name, all at once or none; None for a register's own "there is none".
 
         Raises:
             KeyError: a name that the map does not have.
@@ -84,11 +74,7 @@ class RegisterImage:
         return bytes(self._wire[2 * address : 2 * end])
 
     def bits(self, address: int, count: int) -> bytes:
-        """Return flags as on the wire: eight a byte, the first in the lowest bit.
-
-        Args:
-            address: a register's address times 16 + the bit's number.
-            count: how many.
+        """Return flags as on the wire: eight a byte, the first in the lowest bit; see `bit_address`.
 
         Raises:
             RequestError: 02 if one of them is not in a register of 16 flags.
@@ -101,11 +87,7 @@ class RegisterImage:
         return (every >> address % 16 & (1 << count) - 1).to_bytes((count + 7) // 8, "little")
 
     def written(self, address: int, raw: bytes) -> dict[str, int | float | str]:
-        """Return the fields of a write to registers; nothing is changed.
-
-        Args:
-            address: of the first register.
-            raw: two bytes a register.
+        """Return the fields of a write to registers, two bytes each; nothing is changed.
 
         Raises:
             RequestError: 02 if a register is read-only or not in the map, 03 if a field would be half written or does
@@ -125,12 +107,7 @@ class RegisterImage:
         return values
 
     def written_bits(self, address: int, count: int, bits: int) -> dict[str, int | float | str]:
-        """Return the fields of a write to flags, the other flags unchanged; nothing is changed.
-
-        Args:
-            address: a register's address times 16 + the bit's number.
-            count: how many.
-            bits: their values, the first in the lowest bit.
+        """Return the fields of a write to flags, the first in the lowest bit; nothing is changed.
 
         Raises:
             RequestError: as `written`.

@@ -23,27 +23,14 @@ class LimitedLog:
         self._summed_up_s = float("-inf")
 
     def write(self, kind: str, now_s: float, level: int, message: str, *arguments: object) -> None:
-        """Write a line, or count it as omitted.
-
-        Args:
-            kind: category with its own limit, in the plural, as the summary prints it.
-            now_s: monotonic time.
-            level: of `logging`.
-            message: with the arguments' places, as `logging` takes it.
-            arguments: formatted only if the line is written.
-        """
+        """Write a line, or count it as omitted by the limit of its kind, in the plural for the summary."""
         if self._allowances[kind].take(now_s):
             self._log.log(level, message, *arguments)
         else:
             self._left_out[kind] += 1
 
     def sum_up(self, now_s: float, *, last: bool = False) -> None:
-        """Log the number of omitted lines, if any and if the last summary is long enough ago.
-
-        Args:
-            now_s: monotonic time.
-            last: log it in any case.
-        """
+        """Log the number of omitted lines, if any, when it is due again or, for the last time, at once."""
         if self._left_out and (last or now_s - self._summed_up_s >= SUMMARY_S):
             counts = ", ".join(f"{count} of {kind}" for kind, count in sorted(self._left_out.items()))
             self._log.warning("lines left out: %s", counts)

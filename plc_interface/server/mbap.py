@@ -20,11 +20,7 @@ Frame = tuple[int, int, bytes]
 
 
 def frames(received: bytearray | bytes, size: int) -> Iterator[tuple[Frame, int]]:
-    """Yield every complete ADU, each with the number of bytes up to its end.
-
-    Args:
-        received: the bytes from the beginning of an ADU on.
-        size: how many bytes of it are valid.
+    """Yield every complete ADU in the first `size` bytes, each with the number of bytes up to its end.
 
     Raises:
         MalformedFrameError: after the good ones, at a header that is no Modbus TCP.
@@ -44,11 +40,5 @@ def frames(received: bytearray | bytes, size: int) -> Iterator[tuple[Frame, int]
 
 
 def framed(transaction: int, unit: int, message: bytes) -> bytes:
-    """Return a PDU with its header.
-
-    Args:
-        transaction: of the request, 0 to 65535.
-        unit: of the request.
-        message: the PDU, from the function code on.
-    """
+    """Return a PDU, from its function code on, with the header of its request's transaction (0 to 65535) and unit."""
     return _HEADER.pack(transaction, 0, 1 + len(message), unit) + message

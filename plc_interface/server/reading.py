@@ -12,30 +12,21 @@ from plc_interface.server.image import RegisterImage
 MOST_REGISTERS = 125
 MOST_BITS = 2000
 
-_REQUEST = struct.Struct(">BHH")
-
 
 def read_registers(image: RegisterImage, message: bytes) -> bytes:
-    """Function codes 3 and 4.
-
-    Args:
-        message: the PDU, from the function code on.
+    """Function codes 3 and 4, from a PDU with its function code.
 
     Raises:
         RequestError: 02 or 03.
     """
-    if len(message) != _REQUEST.size:
-        refuse_length(message)
-    function, address, count = _REQUEST.unpack(message)
+    function, address, count = unpacked(">BHH", message)
     registers = checked_registers(image, address, count)
     return bytes((function, len(registers))) + registers
 
 
 def read_bits(image: RegisterImage, message: bytes) -> bytes:
     """Function codes 1 and 2; arguments and errors as `read_registers`."""
-    if len(message) != _REQUEST.size:
-        refuse_length(message)
-    function, address, count = _REQUEST.unpack(message)
+    function, address, count = unpacked(">BHH", message)
     if not 1 <= count <= MOST_BITS:
         raise illegal_value(f"{count} bits were asked for: ask for 1 to {MOST_BITS}")
     bits = image.bits(address, count)
@@ -47,6 +38,13 @@ def checked_registers(image: RegisterImage, address: int, count: int) -> bytes:
     if not 1 <= count <= MOST_REGISTERS:
         raise illegal_value(f"{count} registers were asked for: ask for 1 to {MOST_REGISTERS}")
     return image.registers(address, count)
+
+
+def unpacked(layout: str, message: bytes) -> tuple[int, ...]:
+    """Return a PDU's numbers; RequestError 03 where its length is not the layout's."""
+    if len(message) != struct.calcsize(layout):
+        refuse_length(message)
+    return struct.unpack(layout, message)
 
 
 def refuse_length(message: bytes) -> NoReturn:

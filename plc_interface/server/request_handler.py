@@ -64,10 +64,7 @@ class RequestHandler:
         }
 
     def respond(self, peer: Peer, unit: int, message: bytes) -> bytes:
-        """Return the response, from its function code on.
-
-        Args:
-            message: the PDU, from the function code on; at least that one byte.
+        """Return the response to a PDU of one byte or more, both from the function code on.
 
         Raises:
             RequestError: the request is answered with an exception.

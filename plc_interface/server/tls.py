@@ -32,10 +32,7 @@ class TlsError(StationError):
 
 
 def server_context(settings: ModbusTlsSettings) -> ssl.SSLContext:
-    """Make a TLS server context: TLS 1.3 with client certificates.
-
-    Args:
-        settings: with the three files named.
+    """Make a TLS server context: TLS 1.3 with client certificates, from the three files named in the settings.
 
     Raises:
         TlsError: a file that is missing, unreadable or no PEM, a key that is not the certificate's, a certificate that
@@ -68,11 +65,7 @@ def server_context(settings: ModbusTlsSettings) -> ssl.SSLContext:
 
 
 def identity_of(connection: ssl.SSLObject | None) -> tuple[str, Right]:
-    """Return a client certificate's subject and its role's right; without TLS no name and the right to write.
-
-    Args:
-        connection: of a finished handshake, or None without TLS.
-    """
+    """Return a client's subject and right by its certificate; without TLS no name and the right to write."""
     if connection is None:
         return "", Right.WRITE
     raw = connection.getpeercert(binary_form=True)

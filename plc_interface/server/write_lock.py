@@ -35,12 +35,7 @@ class WriteLock:
         """Of the client that wrote last; empty until one did."""
 
     def claim(self, peer: Peer, now_s: float, holder_heard_s: float) -> bool:
-        """Claim or renew the right to write; False if another client has it.
-
-        Args:
-            now_s: monotonic time.
-            holder_heard_s: time of the present owner's last request.
-        """
+        """Claim or renew the right to write; False if another client has it, last heard at a monotonic time."""
         if self.holder is not peer:
             if self.holder is None:
                 change = WriterChange.CLAIMED

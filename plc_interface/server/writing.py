@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from plc_interface.server.exceptions import illegal_value
 from plc_interface.server.image import RegisterImage
-from plc_interface.server.reading import checked_registers, refuse_length
+from plc_interface.server.reading import checked_registers, refuse_length, unpacked
 
 MOST_REGISTERS = 123
 MOST_REGISTERS_BESIDE_A_READ = 121
@@ -32,7 +32,7 @@ Parser = Callable[[RegisterImage, bytes], Write]
 
 def write_coil(image: RegisterImage, message: bytes) -> Write:
     """Function code 5."""
-    _, address, value = _unpack(">BHH", message)
+    _, address, value = unpacked(">BHH", message)
     if value not in _COIL:
         raise illegal_value(f"a coil is written as 0x0000 or 0xFF00, not {value:#06x}")
     return Write(image.written_bits(address, 1, _COIL[value]), lambda: message)
@@ -40,13 +40,13 @@ def write_coil(image: RegisterImage, message: bytes) -> Write:
 
 def write_register(image: RegisterImage, message: bytes) -> Write:
     """Function code 6."""
-    _, address, _ = _unpack(">BHH", message)
+    _, address, _ = unpacked(">BHH", message)
     return Write(image.written(address, message[3:]), lambda: message)
 
 
 def write_coils(image: RegisterImage, message: bytes) -> Write:
     """Function code 15."""
-    _, address, count = _unpack(">BHH", message[:5])
+    _, address, count = unpacked(">BHH", message[:5])
     if not 1 <= count <= MOST_BITS:
         raise illegal_value(f"{count} coils were to be written: write 1 to {MOST_BITS}")
     raw = _counted(message, 5, (count + 7) // 8)
@@ -56,21 +56,21 @@ def write_coils(image: RegisterImage, message: bytes) -> Write:
 
 def write_registers(image: RegisterImage, message: bytes) -> Write:
     """Function code 16."""
-    _, address, count = _unpack(">BHH", message[:5])
+    _, address, count = unpacked(">BHH", message[:5])
     raw = _registers(message, 5, count, MOST_REGISTERS)
     return Write(image.written(address, raw), lambda: message[:5])
 
 
 def mask_write_register(image: RegisterImage, message: bytes) -> Write:
     """Function code 22."""
-    _, address, and_mask, or_mask = _unpack(">BHHH", message)
+    _, address, and_mask, or_mask = unpacked(">BHHH", message)
     word = image.word(address) & and_mask | or_mask & ~and_mask & 0xFFFF
     return Write(image.written(address, struct.pack(">H", word)), lambda: message)
 
 
 def read_write_registers(image: RegisterImage, message: bytes) -> Write:
     """Function code 23: the read follows the write."""
-    _, read_address, read_count, write_address, write_count = _unpack(">BHHHH", message[:9])
+    _, read_address, read_count, write_address, write_count = unpacked(">BHHHH", message[:9])
     raw = _registers(message, 9, write_count, MOST_REGISTERS_BESIDE_A_READ)
     checked_registers(image, read_address, read_count)
 
@@ -78,12 +78,6 @@ def read_write_registers(image: RegisterImage, message: bytes) -> Write:
         return bytes((message[0], 2 * read_count)) + image.registers(read_address, read_count)
 
     return Write(image.written(write_address, raw), response)
-
-
-def _unpack(layout: str, message: bytes) -> tuple[int, ...]:
-    if len(message) != struct.calcsize(layout):
-        refuse_length(message)
-    return struct.unpack(layout, message)
 
 
 def _registers(message: bytes, at: int, count: int, most: int) -> bytes:

@@ -82,10 +82,7 @@ class Outcome:
 
 
 def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
-    """Measure all images and write tables, masks, pictures and the report.
-
-    Args:
-        on_done: called after each image.
+    """Measure all images and write tables, masks, pictures and the report; `on_done` is called after each image.
 
     Raises:
         BadInputError: the widths do not fit the images, or the folder cannot be written; results measured by then

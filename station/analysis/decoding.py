@@ -36,10 +36,7 @@ def printable_name(name: Path | str) -> str:
 
 
 def decode_file(path: Path) -> Decoded:
-    """Read an image file as stored, without rotation by its EXIF data.
-
-    Args:
-        path: a JPEG, PNG, BMP, TIFF, WebP or PPM file.
+    """Read an image file (JPEG, PNG, BMP, TIFF, WebP or PPM) as stored, without rotation by its EXIF data.
 
     Raises:
         BadInputError: the file cannot be read, is no such image, is cut short, or is absurdly large or small.
@@ -115,11 +112,7 @@ def _check_chunks(path: Path, data: bytes) -> None:
 
 
 def to_colour(path: Path, raw: np.ndarray) -> Decoded:
-    """Convert any stored format to 8-bit BGR, and return the conversions.
-
-    Args:
-        path: for the message.
-        raw: shape (height, width) or (height, width, 1 to 4), dtype uint8 or uint16.
+    """Convert an image, (height, width) or (height, width, 1 to 4), uint8 or uint16, to 8-bit BGR; say how.
 
     Raises:
         BadInputError: another dtype or number of channels.

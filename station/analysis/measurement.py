@@ -45,12 +45,7 @@ class Refused:
 
 
 class _Press:
-    """Measures the images of one press, one after the other, all in one thread.
-
-    Args:
-        get_method: returns the method of the measuring thread.
-        stages: return the stages' pictures.
-    """
+    """Measures the images of one press, one after the other, all in one thread, whose method `get_method` returns."""
 
     def __init__(self, get_method: MakeMethod, *, stages: bool) -> None:
         self._get_method, self._stages = get_method, stages
@@ -58,10 +53,7 @@ class _Press:
         self._tracker: PressTracker | None = None
 
     def measure(self, image: Image) -> tuple[Contact, dict[str, npt.NDArray[np.uint8]]]:
-        """Find the contact in the next image.
-
-        Args:
-            image: of the reference's shape.
+        """Find the contact in the next image, of the reference's shape.
 
         Returns:
             The contact, and the stages' pictures by name.

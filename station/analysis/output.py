@@ -146,11 +146,7 @@ class OutputFolder:
             self.write_picture(f"stages/{measured.source.stem}_{number}_{name}.png", picture)
 
     def write_errors(self, refused: Iterable[Refused]) -> None:
-        """Write the images that could not be measured, with the reasons.
-
-        Args:
-            refused: in the order given by the user.
-        """
+        """Write the images that could not be measured, in the order given by the user, with the reasons."""
         rows = [(item.source.name, item.reason) for item in refused]
         if rows:
             self._write_table("errors.csv", ("image", "error"), rows)
@@ -178,11 +174,7 @@ class OutputFolder:
         self._write_table("curve.csv", CURVE_COLUMNS, rows)
 
     def write_details(self, contacts: Sequence[tuple[str, Contact]]) -> None:
-        """Write the method's own values of its measurement; see `Contact` for the meaning.
-
-        Args:
-            contacts: the image's name with its contact.
-        """
+        """Write by the images' names the method's own values of its measurement; see `Contact` for the meaning."""
         rows = [
             (
                 name,
@@ -194,28 +186,16 @@ class OutputFolder:
         self._write_table("details.csv", DETAIL_COLUMNS, rows)
 
     def write_denoising(self, qualities: Sequence[tuple[str, DenoisingQuality]]) -> None:
-        """Write the figures of the denoising, as in the paper's Table 2.
-
-        Args:
-            qualities: the image's name with its figures.
-        """
+        """Write by the images' names the figures of the denoising, as in the paper's Table 2."""
         rows = [(name, f"{q.psnr_db:.3f}", f"{q.mse:.3f}", f"{q.ssim:.4f}") for name, q in qualities]
         self._write_table("denoising.csv", ("image", "psnr_db", "mse", "ssim"), rows)
 
     def write_picture(self, name: str, picture: npt.NDArray[np.uint8]) -> None:
-        """Write a picture as PNG.
-
-        Args:
-            name: path below the folder.
-            picture: shape (height, width) or (height, width, 3), dtype uint8.
-        """
+        """Write a picture, (height, width) or (height, width, 3), dtype uint8, as PNG at a path below the folder."""
         self.write_bytes(name, cv2.imencode(".png", picture)[1].tobytes())
 
     def write_bytes(self, name: str, data: bytes) -> None:
-        """Write a file.
-
-        Args:
-            name: path below the folder.
+        """Write a file at a path below the folder.
 
         Raises:
             BadInputError: the disk is full or the folder has become unwritable.

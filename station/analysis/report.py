@@ -60,10 +60,6 @@ def render(report: Report) -> str:
 
 
 def jpeg_uri(picture: Image) -> str:
-    """Return a picture as the data URI of a JPEG.
-
-    Args:
-        picture: shape (height, width, 3), dtype uint8.
-    """
+    """Return a picture, shape (height, width, 3), dtype uint8, as the data URI of a JPEG."""
     data = cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY))[1].tobytes()
     return data_uri(data)

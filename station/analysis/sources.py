@@ -77,10 +77,7 @@ def list_sources(places: Sequence[Path], reference: Path | None = None) -> Listi
 
 
 def load_references(place: Path) -> list[Decoded]:
-    """Load the untouched gel: one image, or the images of a folder or video.
-
-    Args:
-        place: an image file, a folder or a video; only the first 32 frames are used.
+    """Load the untouched gel: one image, or the images of a folder or video, of which the first 32 are used.
 
     Raises:
         BadInputError: one of them cannot be read, or they differ in size.

@@ -13,10 +13,7 @@ _LARGEST_FILE_BYTES = 10_000_000
 
 
 def read_widths(path: Path) -> dict[str, float]:
-    """Read a CSV with the columns `image,width_mm`.
-
-    Args:
-        path: the file; further columns are ignored.
+    """Read a CSV with the columns `image,width_mm`; further columns are ignored.
 
     Returns:
         The measured width in mm by the image's name.

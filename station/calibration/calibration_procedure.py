@@ -5,7 +5,6 @@ it gives no scale. A scale needs a known length on the gel: the distance from on
 """
 
 import asyncio
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -20,7 +19,7 @@ from station.calibration.figures import MeasuredScale
 from station.calibration.model import Calibration, Check, Noise, PlacePoint, stamp
 from station.calibration.press import BallPress, Step
 from station.calibration.rig import BallRig, OnProgress, Place, Progress, Unit
-from station.errors import BadInputError, StationError
+from station.errors import BadInputError
 from station.messages import calibration as messages
 from station.messages.message import Definition, Message
 from station.settings.calibration import CalibrationSettings
@@ -28,8 +27,6 @@ from station.settings.recipe import Recipe
 from station.vision.contact import Image
 from station.vision.image_quality import light, sharpness
 from station.vision.scale import Scale
-
-log = logging.getLogger(__name__)
 
 NOISE_FRAMES = 30
 _PLACES_CLOSING_MM = 2.0
@@ -69,11 +66,7 @@ class _Measured(NamedTuple):
 
 
 class CalibrationProcedure:
-    """One run. It stores nothing; when it is cancelled the jaws open.
-
-    Args:
-        places: further places of the ball.
-    """
+    """One run, with further places of the ball. It stores nothing; when it is cancelled the jaws open."""
 
     def __init__(
         self,
@@ -110,17 +103,11 @@ class CalibrationProcedure:
         try:
             measured = await self._measure()
         except BaseException:
-            await self._let_go()
+            await self._press.let_go()
             raise
         await self._rig.release()
         self._say(messages.STEP_JUDGE, 1, 1)
         return await asyncio.to_thread(self._judge, measured)
-
-    async def _let_go(self) -> None:
-        try:
-            await self._rig.release()
-        except StationError as error:
-            log.warning("the jaws could not be opened: %s", error)
 
     async def _measure(self) -> _Measured:
         self._say(messages.STEP_UNTOUCHED, 1, 1, messages.FRAMES(number=NOISE_FRAMES))

@@ -29,14 +29,7 @@ def calibration_checks(
     noise: Noise,
     scale: MeasuredScale | None,
 ) -> list[Check]:
-    """Check a calibration against its limits.
-
-    Args:
-        steps: all of them, as measured.
-        onset_mm: width of the contact onset.
-        noise: of the untouched gel.
-        scale: None if the ball was pressed at one place only.
-    """
+    """Check a calibration against its limits; `scale` is None if the ball was pressed at one place only."""
     plan = recipe.steps
     met_mm = settings.ball_mm + settings.holder_mm
     curve = figures.judged([step.point for step in steps], onset_mm, plan.result_closings_mm[-1])
@@ -110,13 +103,7 @@ def verification_checks(
     onset_mm: float | None,
     pixel_levels: Levels,
 ) -> list[Check]:
-    """Check a verification against the calibration.
-
-    Args:
-        curve: the widths pressed now, in order of closing.
-        onset_mm: width of the contact onset; None if nothing was touched.
-        pixel_levels: noise of the untouched gel.
-    """
+    """Check a verification, its curve in order of closing; `onset_mm` is None if nothing was touched."""
     area = figures.ratio(curve, calibration.curve, "area_px")
     fall = figures.falls(list(dropwhile(lambda point: not point.area_px, curve)))
     noise = max(now / max(was, 0.1) for now, was in zip(pixel_levels, calibration.noise.pixel_levels, strict=True))
@@ -156,11 +143,7 @@ def verification_checks(
 
 
 def check_name(name: str) -> Message:
-    """Return a check's name as a message.
-
-    Args:
-        name: as `Check.name`; that of a check which this version does not have is shown as it is.
-    """
+    """Return a check's name as a message; that of a check which this version does not have is shown as it is."""
     known = _NAMES.get(name)
     return verbatim(name) if known is None else known()
 

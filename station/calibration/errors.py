@@ -10,11 +10,7 @@ class CalibrationError(StationError):
 
 
 class RefusedError(CalibrationError):
-    """The result is no valid calibration; the one before stays in force.
-
-    Args:
-        reasons: each with the remedy.
-    """
+    """The result is no valid calibration, for reasons each with its remedy; the one before stays in force."""
 
     def __init__(self, *reasons: Message) -> None:
         super().__init__(REFUSED(reasons=reasons))

@@ -19,12 +19,7 @@ _STEP_MM = 0.5
 
 
 def noise(frames: Sequence[Image], untouched: Sequence[Contact]) -> Noise:
-    """Measure the noise of frames of the untouched gel.
-
-    Args:
-        frames: three or more of one shape (height, width, 3), dtype uint8.
-        untouched: the method's results on frames with nothing touching.
-    """
+    """Measure the noise of three or more frames of one shape, and of the method's contacts, with nothing touching."""
     gate = max((contact.gate or 0.0 for contact in untouched), default=0.0)
     return Noise(
         pixel_levels=_by_colour(pixel_noise(frames).mean(axis=(0, 1))),
@@ -35,10 +30,7 @@ def noise(frames: Sequence[Image], untouched: Sequence[Contact]) -> Noise:
 
 
 def pixel_noise(frames: Sequence[Image]) -> np.ndarray:
-    """Return the standard deviation of each pixel from frame to frame, without changes of the whole frame.
-
-    Args:
-        frames: three or more of one shape (height, width, 3), dtype uint8.
+    """Return each pixel's standard deviation over three or more frames of one shape, without changes of whole frames.
 
     Returns:
         Shape (height, width, 3), dtype float32, grey levels.
@@ -55,12 +47,7 @@ def pixel_noise(frames: Sequence[Image]) -> np.ndarray:
 
 
 def field_map(reference: Image, frames: Sequence[Image]) -> FieldMap:
-    """Map light and noise over the field. One ball at a few places gives no scale in between.
-
-    Args:
-        reference: shape (height, width, 3), dtype uint8.
-        frames: from which the reference was made.
-    """
+    """Map light and noise over the field. One ball at a few places gives no scale in between."""
     size = (FIELD_COLUMNS, FIELD_ROWS)
     light = cv2.resize(reference.astype(np.float32), size, interpolation=cv2.INTER_AREA).reshape(-1, 3)
     spread = cv2.resize(pixel_noise(frames).max(axis=2), size, interpolation=cv2.INTER_AREA)
@@ -82,13 +69,9 @@ class MeasuredScale(NamedTuple):
 
 
 def scale_of(places: Sequence[PlacePoint], tolerance_mm: float) -> MeasuredScale:
-    """Compute the scale from the motion of the ball's contact in the image over a known distance.
+    """Compute the scale from the motion of the ball's contact in the image between two or more different places.
 
     Distances are compared, so the direction of the places' axes in the image does not matter.
-
-    Args:
-        places: two or more, all different.
-        tolerance_mm: of a distance between two places.
     """
     ways_mm, ways_px = [], []
     for one, other in combinations(places, 2):
@@ -105,11 +88,7 @@ def scale_of(places: Sequence[PlacePoint], tolerance_mm: float) -> MeasuredScale
 
 
 def falls(curve: Sequence[PressPoint]) -> tuple[PressPoint, PressPoint] | None:
-    """Return the first two neighbours between which the area does not rise; None if it rises throughout.
-
-    Args:
-        curve: in order of closing, from the first contact on.
-    """
+    """Return the first neighbours of a curve, from its contact on, between which the area does not rise, or None."""
     return next(((one, other) for one, other in pairwise(curve) if other.area_px <= one.area_px), None)
 
 
@@ -128,11 +107,7 @@ def judged(curve: Sequence[PressPoint], onset_mm: float, closing_mm: float) -> l
 def ratio(
     curve: Sequence[PressPoint], golden: Sequence[PressPoint], what: Literal["area_px", "contrast_levels"]
 ) -> float | None:
-    """Return the median ratio of a ball's areas, or contrasts, to an earlier curve's; None without common widths.
-
-    Args:
-        golden: the earlier curve; interpolated between its points.
-    """
+    """Return the median ratio of areas or contrasts to an interpolated earlier curve's; None without common widths."""
     known = sorted((point.width_mm, getattr(point, what)) for point in golden if point.area_px)
     if len(known) < 2:
         return None

@@ -6,11 +6,7 @@ _MOST_RATIO, _MOST_BEND = 20.0, 10.0
 
 
 def gated(segmentation: Segmentation, factor: float) -> Segmentation:
-    """Raise the robust method's gate in a segmentation; both limits of the gate grow alike.
-
-    Args:
-        factor: of the unit's calibration, 1 or more.
-    """
+    """Raise both limits of the robust method's gate alike, by the factor of the unit's calibration, 1 or more."""
     if factor <= 1.0:
         return segmentation
     robust = segmentation.robust

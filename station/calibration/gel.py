@@ -78,12 +78,7 @@ def examine(image: Image, golden: Image | None, least_light: float) -> list[Find
 
 
 def side_by_side(before: Image, now: Image) -> Image:
-    """Join two named pictures, the earlier one left.
-
-    Args:
-        before: shape (height, width, 3), dtype uint8.
-        now: same shape.
-    """
+    """Join two named pictures of one shape (height, width, 3), dtype uint8, the earlier one left."""
     gap = np.full((before.shape[0], 12, 3), 255, np.uint8)
     return np.hstack([_named(before, "then"), gap, _named(now, "now")])
 
@@ -149,13 +144,7 @@ def _regions(image: Image, golden: Image | None, scale: float) -> tuple[Mask, Ma
 
 
 def outlined(image: Image, mask: Mask, colour: tuple[int, int, int] = (255, 255, 255)) -> Image:
-    """Draw the outline of a mask into a picture.
-
-    Args:
-        image: shape (height, width, 3), dtype uint8.
-        mask: shape (height, width), 0 or more.
-        colour: B, G, R.
-    """
+    """Draw a mask's outline into a picture of its height and width, in a colour B, G, R."""
     outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return np.asarray(cv2.drawContours(image.copy(), outlines, -1, colour, 2), np.uint8)
 

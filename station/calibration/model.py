@@ -172,11 +172,7 @@ class Refusal(Run):
 
 
 def stamp(at: datetime) -> str:
-    """Return a record's name from its time.
-
-    Args:
-        at: with its time zone.
-    """
+    """Return a record's name from its time, which has a time zone."""
     return at.astimezone(UTC).strftime("%Y%m%dT%H%M%SZ")
 
 

@@ -1,26 +1,18 @@
 """Plots of a calibration's and a verification's figures."""
 
 from collections.abc import Sequence
-from io import BytesIO
 
 import numpy as np
 
 from station.calibration.model import Calibration, FieldMap, PressPoint
+from station.charts.report import png
 
 _BLUE, _RED, _GREY = "#1f4e79", "#b3261e", "#888888"
 _DOUBTFUL = 0.5
 
 
 def area_plot(calibration: Calibration, now: Sequence[PressPoint] | None = None) -> bytes:
-    """Plot the ball's area over the gripper's width, as the paper does, with a verification's curve for comparison.
-
-    Args:
-        calibration: the curve drawn first.
-        now: a verification's curve; None for none.
-
-    Returns:
-        A PNG file.
-    """
+    """Plot the ball's area over the gripper's width, as the paper does, and a verification's curve, as a PNG file."""
     figure, axes = _axes()
     _draw(axes, calibration.curve, _BLUE, "calibration", calibration.mm_per_px)
     if now is not None:
@@ -33,15 +25,11 @@ def area_plot(calibration: Calibration, now: Sequence[PressPoint] | None = None)
     axes.set_ylim(bottom=0)
     axes.grid(color="#dddddd", linewidth=0.6)
     figure.legend(loc="outside upper center", ncols=2, frameon=False, fontsize=8)
-    return _png(figure)
+    return png(figure)
 
 
 def field_plot(field: FieldMap) -> bytes:
-    """Plot light and noise over the field.
-
-    Returns:
-        A PNG file.
-    """
+    """Plot light and noise over the field, as a PNG file."""
     figure = _figure(3.4)
     light = np.asarray(field.light_levels).reshape(field.rows, field.columns, 3)
     noise = np.asarray(field.noise_levels).reshape(field.rows, field.columns)
@@ -55,7 +43,7 @@ def field_plot(field: FieldMap) -> bytes:
         bar = figure.colorbar(shown, ax=axes, orientation="horizontal", pad=0.03)
         bar.ax.tick_params(labelsize=7)
     figure.supxlabel("grey levels", fontsize=8)
-    return _png(figure)
+    return png(figure)
 
 
 def _draw(axes, curve: Sequence[PressPoint], colour: str, label: str, mm_per_px: float) -> None:  # noqa: ANN001 (matplotlib's)
@@ -96,9 +84,3 @@ def _axes():  # noqa: ANN202 (matplotlib's)
         axes = figure.add_subplot()
         axes.spines[["top", "right"]].set_visible(False)
     return figure, axes
-
-
-def _png(figure) -> bytes:  # noqa: ANN001 (matplotlib's)
-    data = BytesIO()
-    figure.savefig(data, format="png", dpi=110)
-    return data.getvalue()

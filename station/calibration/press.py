@@ -1,6 +1,7 @@
 """Ball press: presses the ball step by step and measures it, for calibration and verification."""
 
 import asyncio
+import logging
 from dataclasses import dataclass
 
 import cv2
@@ -9,6 +10,7 @@ import numpy as np
 from station.calibration.gate import gated
 from station.calibration.model import PressPoint
 from station.calibration.rig import BallRig
+from station.errors import StationError
 from station.messages import calibration as messages
 from station.messages.message import Message
 from station.press.measurement import PressMeasurement
@@ -20,6 +22,8 @@ from station.settings.recipe import Recipe
 from station.vision.contact import Contact, Image
 from station.vision.methods import make_method
 from station.vocabulary import Flag
+
+log = logging.getLogger(__name__)
 
 _CONTRAST_BLUR_PX = 2.0
 _CONTRAST_PERCENTILE = 90.0
@@ -65,6 +69,13 @@ class BallPress:
         self._measurement: PressMeasurement | None = None
         self.reference: Image | None = None
 
+    async def let_go(self) -> None:
+        """Open the jaws after a failure, whose cause matters more than their own."""
+        try:
+            await self._rig.release()
+        except StationError as error:
+            log.warning("the jaws could not be opened: %s", error)
+
     async def take_reference(self, number: int) -> PressStep:
         """Take frames of the untouched gel, and measure against their median from now on."""
         untouched = await take_reference(self._rig, number)
@@ -87,23 +98,12 @@ class BallPress:
         return Step(seen.step.move.width_mm, seen.image, seen.contact, strength)
 
     async def fine_onset(self, untouched_mm: float, touched_mm: float) -> float:
-        """Search the contact onset, to a count of the gripper.
-
-        Args:
-            untouched_mm: a width without contact.
-            touched_mm: a smaller one with contact.
-        """
+        """Search the onset between a width without and a smaller one with contact, to a count of the gripper."""
         return await bracketed_onset_mm(self._rig, self._recipe, untouched_mm, touched_mm, self.measure)
 
 
 def contrast(image: Image, reference: Image, contact: Contact) -> float:
-    """Return the change of the image by a contact, grey levels: a worn gel loses it first.
-
-    Args:
-        image: shape (height, width, 3), dtype uint8.
-        reference: same shape.
-        contact: found in the image; without one the contrast is 0.
-    """
+    """Return an image's change by a contact, grey levels, 0 without one: a worn gel loses it first."""
     if not contact.found or contact.centroid_px is None:
         return 0.0
     change = image.astype(np.float32) - reference

@@ -91,11 +91,7 @@ def refusal_files(refusal: Refusal, evidence: Evidence) -> dict[str, bytes]:
 
 
 def png(picture: Image) -> bytes:
-    """Encode a picture as a PNG file.
-
-    Args:
-        picture: shape (height, width, 3), dtype uint8.
-    """
+    """Encode a picture, shape (height, width, 3), dtype uint8, as a PNG file."""
     return cv2.imencode(".png", picture)[1].tobytes()
 
 

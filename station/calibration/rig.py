@@ -28,11 +28,7 @@ class BallRig(Rig, Protocol):
     """A press rig with a ball between its fingers."""
 
     async def lay(self, place: Place) -> None:
-        """Have the ball laid at another place, with the jaws open; returns once it is there.
-
-        Args:
-            place: relative to the first place.
-        """
+        """Have the ball laid at a place relative to its first, with the jaws open; returns once it is there."""
         ...
 
 

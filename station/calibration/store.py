@@ -39,13 +39,7 @@ class CalibrationStore:
         self._home = home
 
     def add_calibration(self, calibration: Calibration, files: Mapping[str, bytes]) -> Path:
-        """Store a calibration; from now on it is the unit's.
-
-        Args:
-            files: pictures and page, by name.
-
-        Returns:
-            Its folder.
+        """Store a calibration, with pictures and page by name, and return its folder; from now on it is the unit's.
 
         Raises:
             CalibrationError: it could not be written; nothing is left of it.
@@ -103,11 +97,7 @@ class CalibrationStore:
         return self._home / kind / record.serial / record.id
 
     def find(self, name: str, serial: str | None = None) -> Calibration:
-        """Find a calibration by its name.
-
-        Args:
-            name: as `list` shows it.
-            serial: of its unit; any where None.
+        """Find a calibration by its name, as `list` shows it, among a unit's, or all where `serial` is None.
 
         Raises:
             UnknownCalibrationError: there is none, or it cannot be read.
@@ -148,11 +138,7 @@ class CalibrationStore:
 
 
 def press_name(number: int) -> str:
-    """Return the file name of a step's picture.
-
-    Args:
-        number: of the step, from 0.
-    """
+    """Return the file name of a step's picture, counted from 0."""
     return f"press_{number:02d}.png"
 
 

@@ -1,7 +1,6 @@
 """Verification procedure at the shift's start: the same ball against the stored calibration, and the gel's health."""
 
 import asyncio
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -13,13 +12,10 @@ from station.calibration.model import Calibration, Check, Verification, stamp
 from station.calibration.press import BallPress, Step
 from station.calibration.rig import BallRig, OnProgress, Progress
 from station.calibration.store import press_name
-from station.errors import StationError
 from station.messages import calibration as messages
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import Recipe
 from station.vision.contact import Image
-
-log = logging.getLogger(__name__)
 
 _NOISE_FRAMES = 9
 _EVERY = 2
@@ -44,12 +40,7 @@ class VerificationResult:
 
 
 class VerificationProcedure:
-    """One run; the jaws are open afterwards.
-
-    Args:
-        golden: the calibration's picture of the untouched gel.
-        presses: the calibration's pictures of the ball, in the order of its curve.
-    """
+    """One run against the calibration's pictures, the presses in its curve's order; the jaws are open afterwards."""
 
     def __init__(
         self,
@@ -76,10 +67,7 @@ class VerificationProcedure:
         try:
             verified = await self._run()
         except BaseException:
-            try:
-                await self._rig.release()
-            except StationError as error:
-                log.warning("the jaws could not be opened: %s", error)
+            await self._press.let_go()
             raise
         await self._rig.release()
         return verified

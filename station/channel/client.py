@@ -21,7 +21,7 @@ from station.channel.messages import (
     check_endpoint,
 )
 from station.messages import channel as messages
-from station.messages.message import Message, verbatim
+from station.messages.message import message_in
 
 ReplyT = TypeVar("ReplyT", bound=ChannelMessage)
 RECONNECT_MS = 10
@@ -68,11 +68,7 @@ class ChannelClient:
         await self.close()
 
     async def request(self, request: ChannelMessage, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:
-        """Send a request and return its reply.
-
-        Args:
-            request: a server that receives it later than the deadline ignores it.
-            deadline_s: how long to wait in all.
+        """Send a request and return its reply within the deadline; a server that receives it later ignores it.
 
         Raises:
             DeadlineError: no answer came in time.
@@ -96,7 +92,7 @@ class ChannelClient:
         finally:
             self._waiting.pop(number, None)
         if status != b"ok":
-            raise RefusedError(_why(body))
+            raise RefusedError(message_in(body.decode("utf-8", "replace")) or "")
         try:
             return reply.model_validate_json(body)
         except ValidationError as error:
@@ -147,10 +143,3 @@ async def _next_event(monitor: zmq.asyncio.Socket) -> int:
     """Return the number of the monitor's next event."""
     message = await monitor.recv_multipart()
     return int(parse_monitor_message(message)["event"])
-
-
-def _why(body: bytes) -> Message:
-    try:
-        return Message.model_validate_json(body)
-    except ValidationError:
-        return verbatim(body.decode("utf-8", "replace"))

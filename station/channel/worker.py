@@ -26,10 +26,7 @@ class PanelWorker:
         self._waiting = 0
 
     async def do(self, work: Callable[[], T]) -> T:
-        """Run a function in the thread.
-
-        Args:
-            work: may block, for a moment.
+        """Run a function, which may block for a moment, in the thread.
 
         Raises:
             PanelBusyError: it is not started, or its end is not waited for; a started one runs to its end.

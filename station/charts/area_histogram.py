@@ -15,12 +15,7 @@ Bin = tuple[float, int, int, int]
 
 
 def area_histogram(bins: Sequence[Bin], limits: Sequence[tuple[float, float]]) -> Markup:
-    """Draw a histogram with both axes; empty for no bins.
-
-    Args:
-        bins: of equal width, the first from 0.
-        limits: closing in mm and area in mm²; each is a line with its area.
-    """
+    """Draw a histogram of bins of equal width from 0, with limits (closing in mm, area in mm²); empty for no bins."""
     if not bins:
         return Markup()
     width_mm2 = bins[0][0]

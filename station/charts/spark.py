@@ -6,11 +6,7 @@ from markupsafe import Markup
 
 
 def spark(areas_mm2: Sequence[float | None], wide: int = 96, high: int = 28) -> Markup:
-    """Draw a curve as SVG, scaled from 0 to its largest area; decoration beside its number.
-
-    Args:
-        areas_mm2: in the order of the steps; those without an area are left out.
-    """
+    """Draw a curve as SVG, from 0 to its largest area, steps without one left out; decoration beside its number."""
     largest = max((area for area in areas_mm2 if area is not None), default=0.0) or 1.0
     gap = (wide - 4) / max(1, len(areas_mm2) - 1)
     points = " ".join(

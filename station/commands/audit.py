@@ -4,20 +4,12 @@ from pathlib import Path
 
 import click
 
-from station.commands.records_options import proof_options
+from station.commands.records_options import config_option, folder_of, proof_options
 from station.errors import BadInputError
 from station.records.audit_check import Proof, check_trail
 from station.records.audit_report import format_rows, read_audit
-from station.records.database import reading, records_folder
+from station.records.database import reading
 from station.records.signing import PUBLIC_NAME
-from station.settings.configuration import load_configuration
-
-_config = click.option(
-    "--config",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="The configuration that names the home folder. [default: STATION_CONFIG, or station.yaml in STATION_HOME]",
-)
 
 
 @click.group()
@@ -29,16 +21,16 @@ def audit() -> None:
 @click.option("--last", metavar="N", default=20, show_default=True, type=click.IntRange(1, 100_000), help="How many.")
 @click.option("--action", default="", metavar="NAME", help="Only this action, or all that begin so: recipe, alarm, …")
 @click.option("--subject", default="", metavar="TEXT", help="Only rows with this text in their subject.")
-@_config
+@config_option
 def show(last: int, action: str, subject: str, config: Path | None) -> None:
     """Show the last rows, oldest first: action, object, person, time, reason, and the value before."""
-    with reading(records_folder(load_configuration(config).home)) as connection:
+    with reading(folder_of(config)) as connection:
         click.echo(format_rows(read_audit(connection, last, action, subject)))
 
 
 @audit.command()
 @proof_options
-@_config
+@config_option
 @click.pass_context
 def verify(context: click.Context, proof: Proof, config: Path | None) -> None:
     """Check that no row was changed, removed or inserted; exit code 1 if one was.
@@ -46,7 +38,7 @@ def verify(context: click.Context, proof: Proof, config: Path | None) -> None:
     Rows cut off at the end are found by the signed head that is stored beside the database, and by any
     ROW:HASH:SIGNATURE that this command printed before and a person stored elsewhere.
     """
-    found = check_trail(records_folder(load_configuration(config).home), proof)
+    found = check_trail(folder_of(config), proof)
     for text in found.notes:
         click.echo(f"note {text}", err=True)
     for text in found.broken:
@@ -57,10 +49,10 @@ def verify(context: click.Context, proof: Proof, config: Path | None) -> None:
 
 
 @audit.command("public-key")
-@_config
+@config_option
 def public_key(config: Path | None) -> None:
     """Print the public part of the station's signing key: store it elsewhere, to check copies and backups by it."""
-    path = records_folder(load_configuration(config).home) / PUBLIC_NAME
+    path = folder_of(config) / PUBLIC_NAME
     if not path.exists():
         raise BadInputError(f"{path}: there is none; the station makes its key when it starts")
     click.echo(path.read_text(encoding="ascii", errors="replace"), nl=False)

@@ -51,11 +51,8 @@ def check(config: Path | None, bench: bool) -> None:  # noqa: FBT001 (click pass
         raise StationError(f"not usable: {', '.join(faulty)}")
 
 
-VERBS = get_args(RecoveryName)
-
-
 @devices.command("recover")
-@click.argument("what", type=click.Choice(VERBS))
+@click.argument("what", type=click.Choice(get_args(RecoveryName)))
 @click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
 @click.option("--yes", is_flag=True, help="Do not ask: a person has looked.")
 def recover(what: RecoveryName, config: Path | None, yes: bool) -> None:  # noqa: FBT001

@@ -131,20 +131,12 @@ class _Recording:
         return len(self._rows)
 
     def add_references(self, references: Sequence[Image]) -> None:
-        """Write the reference frames.
-
-        Args:
-            references: images with nothing touching the gel.
-        """
+        """Write the reference frames: images with nothing touching the gel."""
         for number, image in enumerate(references):
             self._write(f"reference/reference_{number}.png", image)
 
     def add(self, step: Step, mask: npt.NDArray[np.uint8] | None) -> None:
-        """Write a step: picture, true mask if known, and a row of the table.
-
-        Args:
-            mask: shape (height, width), 0 or 255.
-        """
+        """Write a step: picture, true mask if known, shape (height, width), 0 or 255, and a row of the table."""
         name = f"step_{len(self._rows):02d}.png"
         self._write(f"frames/{name}", step.image)
         if mask is not None:

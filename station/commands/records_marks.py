@@ -1,12 +1,12 @@
 """`station records mark`: a person's mark of fruit as good or bad, for proposed thresholds."""
 
-from datetime import UTC, datetime
 from pathlib import Path
 
 import click
 
 from station.commands.records_options import by_option, config_option, folder_of
 from station.records.audit import AuditEntry, append_audit
+from station.records.clock import formatted
 from station.records.database import reading
 from station.records.marks import Mark, place_mark, read_marked
 from station.records.short_transaction import short_transaction
@@ -42,5 +42,4 @@ def marks(config: Path | None) -> None:
     """List the fruit that people have marked, with person and time."""
     with reading(folder_of(config)) as connection:
         for each in read_marked(connection):
-            when = datetime.fromtimestamp(each.marked_utc_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
-            click.echo(printable(f"{each.sequence}  {each.mark}  by {each.by}, {when}"))
+            click.echo(printable(f"{each.sequence}  {each.mark}  by {each.by}, {formatted(each.marked_utc_ms)}"))

@@ -1,7 +1,7 @@
 """Options shared by commands of `station records`."""
 
 import getpass
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -26,11 +26,7 @@ config_option = click.option(
 
 
 def folder_of(config: Path | None) -> Path:
-    """Return the records' folder.
-
-    Args:
-        config: the file that the user named.
-    """
+    """Return the records' folder of the configuration's file that the user named."""
     return records_folder(load_configuration(config).home)
 
 
@@ -77,8 +73,6 @@ def query_options(command: Callable[..., Any]) -> Callable[..., Any]:
         why = None if reason is None else Reason(reason)
         return command(query=Query(lot, grower, begun_from, begun_to, outcome, why, fruit), **others)
 
-    gathered.__name__, gathered.__doc__ = command.__name__, command.__doc__
-    gathered.__click_params__ = getattr(command, "__click_params__", [])  # type: ignore[attr-defined] (click's own)
     options = (
         click.option("--lot", metavar="NAME", help="Of this lot."),
         click.option("--grower", metavar="NAME", help="Of this grower's lots; see `station records lot`."),
@@ -94,10 +88,18 @@ def query_options(command: Callable[..., Any]) -> Callable[..., Any]:
         ),
         click.option("--fruit", metavar="NAME", help="Inspected by this recipe, whatever its revision."),
     )
-    decorated: Callable[..., Any] = gathered
+    return _with_options(gathered, command, options)
+
+
+def _with_options(
+    gathered: Callable[..., Any], command: Callable[..., Any], options: Sequence[Callable[..., Any]]
+) -> Callable[..., Any]:
+    """Name and document an option reader as its command, and put these options before the command's own."""
+    gathered.__name__, gathered.__doc__ = command.__name__, command.__doc__
+    gathered.__click_params__ = getattr(command, "__click_params__", [])  # type: ignore[attr-defined] (click's own)
     for option in reversed(options):
-        decorated = option(decorated)
-    return decorated
+        gathered = option(gathered)
+    return gathered
 
 
 def by_option(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -116,8 +118,6 @@ def proof_options(command: Callable[..., Any]) -> Callable[..., Any]:
             raise BadInputError("--anchor: with --public-key an anchor needs its signature: ROW:HASH:SIGNATURE")
         return command(proof=Proof(heads, tuple(map(read_public_key, public_keys)), since), **others)
 
-    gathered.__name__, gathered.__doc__ = command.__name__, command.__doc__
-    gathered.__click_params__ = getattr(command, "__click_params__", [])  # type: ignore[attr-defined] (click's own)
     options = (
         click.option(
             "--anchor",
@@ -131,10 +131,7 @@ def proof_options(command: Callable[..., Any]) -> Callable[..., Any]:
             "--since", default=0, metavar="ROW", type=click.IntRange(0), help="Leave out rows before it: a known break."
         ),
     )
-    decorated: Callable[..., Any] = gathered
-    for option in reversed(options):
-        decorated = option(decorated)
-    return decorated
+    return _with_options(gathered, command, options)
 
 
 def _anchor(text: str) -> Head:

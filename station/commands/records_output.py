@@ -8,7 +8,7 @@ from station.commands.records_options import config_option, folder_of, query_opt
 from station.records.error_mapping import map_error
 from station.records.export import SUFFIXES
 from station.records.export import export as write_export
-from station.records.lot_report import SUFFIX, write_report
+from station.records.lot_report import SUFFIX, html_report
 from station.records.lot_summary import summarise
 from station.records.search import Query
 from station.settings.configuration import load_configuration
@@ -37,7 +37,7 @@ def report(lot: str, file: Path, config: Path | None) -> None:
         )
     summary = summarise(folder_of(config), lot)
     try:
-        write_report(summary, load_configuration(config).outbox.station, file)
+        file.write_text(html_report(summary, load_configuration(config).outbox.station), encoding="utf-8")
     except OSError as error:
         raise map_error(error, str(file)) from error
     click.echo(f"{file}: {summary.total} inspections of lot {lot}")

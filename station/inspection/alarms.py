@@ -170,11 +170,7 @@ class Alarms:
         return self._after(alarm, E.RESET)
 
     def shelve(self, alarm: AlarmId, now_s: float, for_s: float, by: str) -> Self:
-        """Hide it for a time, `LONGEST_SHELVED_S` at most; a latched one is never hidden.
-
-        Args:
-            now_s: UTC.
-        """
+        """Hide it for a time from now (UTC), `LONGEST_SHELVED_S` at most; a latched one is never hidden."""
         if (self.get(alarm).state, E.SHELVED) not in _life(alarm):
             return self
         until_s = now_s + min(max(0.0, for_s), LONGEST_SHELVED_S)

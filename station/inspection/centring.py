@@ -24,23 +24,11 @@ NOT_MOVED = Way()
 
 
 def off_middle(centroid_px: tuple[float, float], shape: tuple[int, ...], mm_per_px: float) -> Way:
-    """From the field's middle to a contact.
-
-    Args:
-        centroid_px: the contact's, x and y.
-        shape: the image's height and width, px.
-        mm_per_px: the unit's scale.
-    """
+    """From the middle of an image, height and width in px, to a contact's centroid, x and y in px."""
     (x_px, y_px), (height_px, width_px) = centroid_px, shape[:2]
     return Way(mm_per_px * (x_px - (width_px - 1) / 2), mm_per_px * (y_px - (height_px - 1) / 2))
 
 
 def too_far(off: Way, moved: Way, most_mm: float) -> bool:
-    """Whether the sensor may not follow a contact.
-
-    Args:
-        off: from the field's middle to the contact.
-        moved: where the sensor is, from its taught place.
-        most_mm: how far from there it may go.
-    """
+    """Whether the sensor, moved from its taught place, may not follow a contact off the middle: beyond `most_mm`."""
     return moved.then(off).length_mm > most_mm

@@ -40,9 +40,6 @@ def area_curve(readings: Iterable[Reading]) -> AreaCurve:
 
     Readings at one width keep their order.
 
-    Args:
-        readings: widths in mm, areas in px and mm².
-
     Returns:
         The curve; the closing is the paper's "width difference" (Computers and Electronics in Agriculture 235
         (2025) 110397).

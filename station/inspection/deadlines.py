@@ -124,9 +124,6 @@ FAULT_OF: dict[State, Event] = {state: event for event, states in _WAITS_FOR.ite
 def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
     """The deadlines of a recipe's inspection on a cell.
 
-    Args:
-        recipe: steps, speeds, settling, frames, and how often it may press a fruit.
-
     Raises:
         BadInputError: the inspection would take longer than the PLC can be told.
     """

@@ -125,20 +125,12 @@ class Evidence:
         return [self.judged[wrong.index] for wrong in wrong_frames(widths, areas, RELATIVE_NOISE, least_noise)]
 
     def area_at(self, closing_mm: float) -> tuple[float, float] | None:
-        """Area and expanded uncertainty between the two points around a closing, mm²; None where it was not reached.
-
-        Args:
-            closing_mm: where, more than 0.
-        """
+        """Area and expanded uncertainty, mm², between the points around a closing above 0; None if not reached."""
         found = _between(self.points, closing_mm)
         return None if found is None else self._with_uncertainty(closing_mm, *found)
 
     def budget_at(self, closing_mm: float) -> Budget:
-        """What the uncertainty of an area at a closing is made of.
-
-        Args:
-            closing_mm: where, more than 0.
-        """
+        """What the uncertainty of an area at a closing above 0 is made of."""
         return budget_at(closing_mm, self._press, self._limits)
 
     def _with_uncertainty(self, closing_mm: float, area_mm2: float, scatter_mm2: float) -> tuple[float, float]:

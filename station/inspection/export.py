@@ -55,11 +55,7 @@ active: bit number - 1 of the register `alarms`, or for the numbers from 33 on b
 
 
 def exported(root: Path = ROOT) -> dict[Path, str]:
-    """What each file has to hold.
-
-    Args:
-        root: the checkout.
-    """
+    """What each file of the checkout has to hold."""
     documents = root / "docs"
     return {
         documents / "cycle.md": cycle_document(),

@@ -115,12 +115,7 @@ _LATE_START = 0.25
 
 
 def judge(press: Press, recipe: Recipe) -> Judgement:
-    """Judge a press. The same for any order of the points, and for areas and limits in any one unit.
-
-    Args:
-        press: all measured points, in any order.
-        recipe: limits and expectations.
-    """
+    """Judge a press. The same for any order of the points, and for areas and limits in any one unit."""
     case = _case(press, recipe)
     stopped = case.stopped
     findings = [*case.findings, *([] if case.nothing else _reach(case, stopped))]
@@ -357,12 +352,7 @@ def _area(evidence: Evidence, threshold: AreaThreshold, limits: SizedLimits) -> 
 
 
 def limit_message(limit_mm2: float, limits: SizedLimits) -> Message:
-    """An area limit with the fruit that it is for, as part of a sentence.
-
-    Args:
-        limit_mm2: the limit for the fruit.
-        limits: what it was made from.
-    """
+    """An area limit with the fruit that it is for, as part of a sentence."""
     if limits.without_size:
         return messages.LIMIT_WITHOUT_SIZE(limit_mm2=limit_mm2)
     if limits.length_mm is None:

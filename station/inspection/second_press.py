@@ -23,23 +23,16 @@ _PER_SPREAD = 10.0
 
 
 def needs_second_press(verdict: Judgement) -> bool:
-    """Whether another press may decide what is not decided yet. A fault or a size that cannot be is never one.
-
-    Args:
-        verdict: on all presses so far.
-    """
+    """Whether another press may decide what is still undecided; a fault, or a size that cannot be, it cannot decide."""
     return verdict.outcome == "NO_RESULT" and set(verdict.reasons) <= PRESS_AGAIN_AT | {Reason.EARLY_STOP}
 
 
 def together(presses: Sequence[Press]) -> Press:
-    """Presses on one fruit as one: at each closing the mean of what is trusted, else the later one's.
+    """One or more presses, in order, on one fruit as one: at each closing the mean of what is trusted, else the last's.
 
     What differs from fruit to fruit is the same in both, so the uncertainty is no smaller for the mean. An area that is
     a lower bound in one press is one in the other: the fruit is never judged by less. Two areas whose edges are both
     weak in the noise count as the larger one, with the confidence that both give together.
-
-    Args:
-        presses: in order, at least one.
 
     Returns:
         The last one, with its onset and as far as it has come, and these areas.

@@ -37,10 +37,6 @@ def sized_limits(press: Press, recipe: Recipe) -> SizedLimits:
 
     Only a size that is missing may be replaced by the recipe's fallback. One that cannot be is a fault of the line or
     another fruit's, and then nothing that is known of this fruit's size is true.
-
-    Args:
-        press: with the size as the PLC wrote it, and the width at which the gripper met the fruit.
-        recipe: with limits for a fruit of the reference size.
     """
     rule, size = recipe.damage.size, press.size
     if rule is None:

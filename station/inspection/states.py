@@ -85,27 +85,19 @@ def _inspecting(text: Definition, packml: PackmlState = PackmlState.EXECUTE) -> 
     return StateFacts(packml, Refusal.BUSY, text)
 
 
-def _preparing(text: Definition, packml: PackmlState) -> StateFacts:
-    return StateFacts(packml, Refusal.NOT_READY, text)
+def _not_ready(
+    text: Definition, packml: PackmlState | None, *, needs_person: bool = False, may_exit: bool = False
+) -> StateFacts:
+    return StateFacts(packml, Refusal.NOT_READY, text, needs_person, may_exit)
 
 
 STATES: dict[State, StateFacts] = {
-    State.UNKNOWN: StateFacts(
-        None,
-        Refusal.NOT_READY,
-        texts.UNKNOWN,
-        may_exit=True,
-    ),
-    State.CLEARING: _preparing(texts.CLEARING, PackmlState.CLEARING),
-    State.STOPPED: StateFacts(
-        PackmlState.STOPPED,
-        Refusal.NOT_READY,
-        texts.STOPPED,
-        may_exit=True,
-    ),
-    State.RESETTING: _preparing(texts.RESETTING, PackmlState.RESETTING),
-    State.HOMING: _preparing(texts.HOMING, PackmlState.RESETTING),
-    State.CHECKING: _preparing(texts.CHECKING, PackmlState.RESETTING),
+    State.UNKNOWN: _not_ready(texts.UNKNOWN, None, may_exit=True),
+    State.CLEARING: _not_ready(texts.CLEARING, PackmlState.CLEARING),
+    State.STOPPED: _not_ready(texts.STOPPED, PackmlState.STOPPED, may_exit=True),
+    State.RESETTING: _not_ready(texts.RESETTING, PackmlState.RESETTING),
+    State.HOMING: _not_ready(texts.HOMING, PackmlState.RESETTING),
+    State.CHECKING: _not_ready(texts.CHECKING, PackmlState.RESETTING),
     State.IDLE: StateFacts(PackmlState.IDLE, None, texts.IDLE, may_exit=True),
     State.ACCEPTING: _inspecting(texts.ACCEPTING, PackmlState.STARTING),
     State.REFERENCE: _inspecting(texts.REFERENCE),
@@ -134,29 +126,12 @@ STATES: dict[State, StateFacts] = {
     State.RETREATING_ACCEPTING: _inspecting(texts.RETREATING_ACCEPTING, PackmlState.STARTING),
     State.RETREATING_ACCEPTED: _inspecting(texts.RETREATING_ACCEPTED),
     State.RECORDING_HELD: _inspecting(texts.RECORDING_HELD, PackmlState.HOLDING),
-    State.OPENING_HELD: _preparing(texts.OPENING_HELD, PackmlState.HOLDING),
-    State.OPENING_UNRECORDED: _preparing(texts.OPENING_UNRECORDED, PackmlState.HOLDING),
-    State.HOMING_UNRECORDED: _preparing(texts.HOMING_UNRECORDED, PackmlState.HOLDING),
-    State.HELD: StateFacts(
-        PackmlState.HELD,
-        Refusal.NOT_READY,
-        texts.HELD,
-        may_exit=True,
-    ),
-    State.CARRIED: StateFacts(
-        PackmlState.HELD,
-        Refusal.NOT_READY,
-        texts.CARRIED,
-        needs_person=True,
-        may_exit=True,
-    ),
+    State.OPENING_HELD: _not_ready(texts.OPENING_HELD, PackmlState.HOLDING),
+    State.OPENING_UNRECORDED: _not_ready(texts.OPENING_UNRECORDED, PackmlState.HOLDING),
+    State.HOMING_UNRECORDED: _not_ready(texts.HOMING_UNRECORDED, PackmlState.HOLDING),
+    State.HELD: _not_ready(texts.HELD, PackmlState.HELD, may_exit=True),
+    State.CARRIED: _not_ready(texts.CARRIED, PackmlState.HELD, needs_person=True, may_exit=True),
     State.RECORDING_LATCHED: _inspecting(texts.RECORDING_LATCHED, PackmlState.ABORTING),
-    State.LATCHED: StateFacts(
-        PackmlState.ABORTED,
-        Refusal.NOT_READY,
-        texts.LATCHED,
-        needs_person=True,
-        may_exit=True,
-    ),
-    State.RECOVERING: _preparing(texts.RECOVERING, PackmlState.CLEARING),
+    State.LATCHED: _not_ready(texts.LATCHED, PackmlState.ABORTED, needs_person=True, may_exit=True),
+    State.RECOVERING: _not_ready(texts.RECOVERING, PackmlState.CLEARING),
 }

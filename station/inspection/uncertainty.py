@@ -61,22 +61,12 @@ class Budget:
         return self.factor * self.combined
 
     def expanded_of(self, *names: str) -> float:
-        """What some of the components alone would give, as a share of the area.
-
-        Args:
-            names: of `COMPONENTS`.
-        """
+        """What some of `COMPONENTS` alone would give, as a share of the area."""
         return self.factor * hypot(*(each.relative for each in self.components if each.name in names))
 
 
 def budget_at(closing_mm: float, press: Press, limits: SizedLimits) -> Budget:
-    """The budget of an area at a closing.
-
-    Args:
-        closing_mm: more than 0.
-        press: with what is known of its onset, gripper and scale.
-        limits: for the fruit's size.
-    """
+    """The budget of an area at a closing above 0."""
     rule = limits.recipe.damage.uncertainty
     # Hertz's contact: the area goes as the closing, so an error of the closing is the same share of the area.
     per_mm = 1 / closing_mm
@@ -94,11 +84,7 @@ def budget_at(closing_mm: float, press: Press, limits: SizedLimits) -> Budget:
 
 
 def rectangular(width: float) -> float:
-    """The standard uncertainty of what lies anywhere in an interval alike (GUM 4.3.7).
-
-    Args:
-        width: the interval's, whole.
-    """
+    """The standard uncertainty of what lies anywhere in an interval of this width alike (GUM 4.3.7)."""
     return width / sqrt(12)
 
 

@@ -92,20 +92,14 @@ CONNECTION_FAILED = define("arm.connection_failed", "ur-rtde could not connect: 
 NOTHING_RECEIVED = define("arm.nothing_received", "ur-rtde receives nothing: {reason}", reason=Nested())
 NO_REASON = define("arm.no_reason", "no reason given")
 STATE_OLD = define("arm.state_old", "the controller's state is {age_s} s old", age_s=Number(2))
-STATE_LATE = define("arm.state_late", "the arm's process reported no state within {limit_s} s", limit_s=Number())
+STATE_LATE = define("arm.state_late", "the arm's process reported no state within {limit_s} s")
 STATE_NOT_RECEIVED = define("arm.state_not_received", "the controller's state is not received yet")
 NOT_COMMANDED = define("arm.not_commanded", "the connection that commands the arm is not open yet")
 LINK_BUSY = define(
-    "arm.link_busy",
-    "the connection to the arm was busy for {limit_s} s (request: {request})",
-    limit_s=Number(),
-    request=Nested(),
+    "arm.link_busy", "the connection to the arm was busy for {limit_s} s (request: {request})", request=Nested()
 )
 PROCESS_SILENT = define(
-    "arm.process_silent",
-    "the arm's process did not answer within {limit_s} s (request: {request})",
-    limit_s=Number(),
-    request=Nested(),
+    "arm.process_silent", "the arm's process did not answer within {limit_s} s (request: {request})", request=Nested()
 )
 PROCESS_UNUSABLE = define("arm.process_unusable", "the arm's process cannot be used: {reason}")
 PROCESS_NOT_STARTED = define("arm.process_not_started", "the arm's process cannot be started: {reason}")
@@ -120,8 +114,6 @@ PROCESS_RESTARTS = define_plural(
     "the arm's process ended {times} time in {window_s} s",
     "the arm's process ended {times} times in {window_s} s",
     "times",
-    times=Number(),
-    window_s=Number(),
 )
 
 DASHBOARD_SILENT = define("arm.dashboard_silent", "the dashboard server at {host} does not answer")
@@ -156,15 +148,12 @@ OFFSET_TOO_LONG = define(
     x_mm=Number(1),
     y_mm=Number(1),
     z_mm=Number(1),
-    limit_mm=Number(),
 )
 MOTION_STOPPED = define("arm.motion_stopped", "the station stopped the arm on its way to {pose}", pose=Nested())
 NOT_REACHED = define("arm.not_reached", "the arm came to rest without reaching {pose}", pose=Nested())
-TOO_LATE = define("arm.too_late", "the arm did not reach {pose} within {limit_s} s", pose=Nested(), limit_s=Number())
+TOO_LATE = define("arm.too_late", "the arm did not reach {pose} within {limit_s} s", pose=Nested())
 NO_REST = define("arm.no_rest", "the arm did not come to rest in time")
-RECOVERY_TOO_LONG = define(
-    "arm.recovery_too_long", "{recovery} did not end within {limit_s} s", recovery=Nested(), limit_s=Number()
-)
+RECOVERY_TOO_LONG = define("arm.recovery_too_long", "{recovery} did not end within {limit_s} s", recovery=Nested())
 RECOVERY_PROTECTIVE_STOP = define("arm.recovery_protective_stop", "leaving the protective stop")
 RECOVERY_POWER = define("arm.recovery_power", "powering on")
 RECOVERY_UPLOAD = define("arm.recovery_upload", "uploading the program")
@@ -190,16 +179,11 @@ CHECK_RTDE_REFUSES = define("arm.check_rtde_refuses", "RTDE at {address}, contro
 CHECK_RTDE_FROZEN = define(
     "arm.check_rtde_frozen",
     "RTDE at {address}, controller {version}, whose state is frozen or more than {limit_s} s late",
-    limit_s=Number(),
 )
 CHECK_RTDE_REGISTERS = define(
     "arm.check_rtde_registers", "RTDE at {address}, controller {version}, its input registers are in use"
 )
-CHECK_RTDE_LATE = define(
-    "arm.check_rtde_late",
-    "what is at {address} answers an RTDE request later than {limit_s} s",
-    limit_s=Number(),
-)
+CHECK_RTDE_LATE = define("arm.check_rtde_late", "what is at {address} answers an RTDE request later than {limit_s} s")
 CHECK_RTDE_CLOSES = define("arm.check_rtde_closes", "what is at {address} closes the connection at an RTDE request")
 CHECK_NO_ANSWER = define("arm.check_no_answer", "nothing answers at {address}")
 CHECK_PROGRAMS = define("arm.check_programs", "programs are taken at {address}")

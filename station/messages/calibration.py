@@ -13,14 +13,14 @@ STEP_PLACE = define("calibration.step_place", "the ball at another place")
 STEP_JUDGE = define("calibration.step_judge", "the result")
 
 # Progress of the steps.
-FRAMES = define("calibration.frames", "{number} frames, nothing may touch the gel", number=Number())
+FRAMES = define("calibration.frames", "{number} frames, nothing may touch the gel")
 ONSET_BETWEEN = define(
     "calibration.onset_between", "between {wider_mm} and {narrower_mm} mm", wider_mm=Number(1), narrower_mm=Number(1)
 )
 ONSET_FROM = define("calibration.onset_from", "from {width_mm} mm", width_mm=Number(1))
-AREA_AT = define("calibration.area_at", "{width_mm} mm: {area_px} px", width_mm=Number(2), area_px=Number())
+AREA_AT = define("calibration.area_at", "{width_mm} mm: {area_px} px", width_mm=Number(2))
 NO_CONTACT_AT = define("calibration.no_contact_at", "{width_mm} mm: no contact", width_mm=Number(2))
-PLACE = define("calibration.place", "place {number}, {x_mm},{y_mm} mm", number=Number(), x_mm=Number(), y_mm=Number())
+PLACE = define("calibration.place", "place {number}, {x_mm},{y_mm} mm")
 PLACE_SEEN = define(
     "calibration.place_seen", "{place}: at {x_px}, {y_px} px", place=Nested(), x_px=Number(0), y_px=Number(0)
 )
@@ -43,12 +43,8 @@ CHECK_WEAR = define("calibration.check_wear", "wear")
 
 # What a check found, expected, and asks for.
 CONTACT_BEGINS = define("calibration.contact_begins", "contact begins at {width_mm} mm", width_mm=Number(2))
-WIDTH_EXPECTED = define(
-    "calibration.width_expected", "{width_mm} ± {tolerance_mm} mm", width_mm=Number(1), tolerance_mm=Number()
-)
-ONSET_EXPECTED = define(
-    "calibration.onset_expected", "{width_mm} ± {tolerance_mm} mm", width_mm=Number(2), tolerance_mm=Number()
-)
+WIDTH_EXPECTED = define("calibration.width_expected", "{width_mm} ± {tolerance_mm} mm", width_mm=Number(1))
+ONSET_EXPECTED = define("calibration.onset_expected", "{width_mm} ± {tolerance_mm} mm", width_mm=Number(2))
 DO_BALL = define(
     "calibration.do_ball",
     "another ball or holder, or the gripper's zero is off: look at the ball, then at "
@@ -58,11 +54,7 @@ AXES_DIFFER = define("calibration.axes_differ", "the contact's axes differ by {p
 AXES_EXPECTED = define("calibration.axes_expected", "a ball's, at most {percent}%", percent=Number(0))
 DO_ROUND = define("calibration.do_round", "lay the rubber ball in, upright between the fingers, and nothing else")
 STEPS_WHOLE = define_plural(
-    "calibration.steps_whole",
-    "{number} step shows a whole contact",
-    "{number} steps show a whole contact",
-    "number",
-    number=Number(),
+    "calibration.steps_whole", "{number} step shows a whole contact", "{number} steps show a whole contact", "number"
 )
 AT_LEAST = define("calibration.at_least", "at least {value}", value=Number())
 AT_MOST = define("calibration.at_most", "at most {value}", value=Number(2))
@@ -73,8 +65,6 @@ AREA_FALLS = define(
     "from {wider_mm} to {narrower_mm} mm the area goes from {before_px} to {after_px} px",
     wider_mm=Number(1),
     narrower_mm=Number(1),
-    before_px=Number(),
-    after_px=Number(),
 )
 NO_AREA = define("calibration.no_area", "no area")
 RISE_EXPECTED = define("calibration.rise_expected", "an area that rises step by step")
@@ -89,10 +79,7 @@ GATE_REACHED = define(
 DO_NOISE = define("calibration.do_noise", "keep outside light off, check the sensor's cable and light, and try again")
 SCALE_FOUND = define("calibration.scale_found", "{scale_mm} mm/px ± {percent}%", scale_mm=Number(5), percent=Number(1))
 SCALE_EXPECTED = define(
-    "calibration.scale_expected",
-    "{least_mm} to {most_mm} mm/px, known better than without a measurement",
-    least_mm=Number(),
-    most_mm=Number(),
+    "calibration.scale_expected", "{least_mm} to {most_mm} mm/px, known better than without a measurement"
 )
 DO_SCALE = define("calibration.do_scale", "lay the ball at exactly the requested places, and try again")
 NOTHING_TOUCHED_NOW = define("calibration.nothing_touched_now", "nothing was touched")
@@ -141,7 +128,6 @@ BLEMISHED = define_plural(
     "{number} place on the gel, {percent}% of the field, looks like dirt or damage",
     "{number} places on the gel, {percent}% of the field, look like dirt or damage",
     "number",
-    number=Number(),
     percent=Number(1),
 )
 NEWLY_BLEMISHED = define_plural(
@@ -149,7 +135,6 @@ NEWLY_BLEMISHED = define_plural(
     "{number} new place on the gel, {percent}% of the field, looks like dirt or damage",
     "{number} new places on the gel, {percent}% of the field, look like dirt or damage",
     "number",
-    number=Number(),
     percent=Number(1),
 )
 WORN = define(
@@ -184,7 +169,6 @@ TOUCHED_AT_START = define(
     "something touches the gel at the start, {width_mm} mm, and a {ball_mm} mm ball is met at {met_mm} mm: take it "
     "out, look for the right ball and what holds it",
     width_mm=Number(1),
-    ball_mm=Number(),
     met_mm=Number(1),
 )
 NOTHING_TOUCHED = define(
@@ -200,7 +184,7 @@ PLACE_UNSEEN = define(
     width_mm=Number(1),
 )
 PLACES_TOO_NEAR = define(
-    "calibration.places_too_near", "expected places at least {least_mm} mm apart, the first is 0,0", least_mm=Number()
+    "calibration.places_too_near", "expected places at least {least_mm} mm apart, the first is 0,0"
 )
 UNKNOWN = define("calibration.unknown", "there is no calibration {name}; see `station calibrate list`")
 NOT_STORED = define(
@@ -224,12 +208,11 @@ SUMMARY_USUAL = define(
     scale_mm=Number(5),
     percent=Number(1),
 )
-IN_USE = define("calibration.in_use", "{summary}, in use {scale_mm} mm/px", summary=Nested(), scale_mm=Number())
-NONE = define("calibration.none", "none: {scale_mm} mm/px, by the configuration", scale_mm=Number())
+IN_USE = define("calibration.in_use", "{summary}, in use {scale_mm} mm/px", summary=Nested())
+NONE = define("calibration.none", "none: {scale_mm} mm/px, by the configuration")
 NONE_ALLOWED = define(
     "calibration.none_allowed",
     "none: {scale_mm} mm/px, by the configuration; inspecting is allowed by service.uncalibrated",
-    scale_mm=Number(),
 )
 RATIO_OF_BALL = define(
     "calibration.ratio_of_ball", "the ball's area is {percent}% of the calibration's", percent=Number(1)
@@ -253,7 +236,6 @@ VERIFICATION_OLD = define(
     "calibration.verification_old",
     "The last verification is {age_h} h old, at most {limit_h} h are allowed: verify with the ball {how}",
     age_h=Number(1),
-    limit_h=Number(),
     how=Nested(),
 )
 HOW_TO_VERIFY = define(
@@ -262,10 +244,7 @@ HOW_TO_VERIFY = define(
 )
 MISSING = define("calibration.missing", "the sensor is not calibrated: calibrate it first")
 OLD = define(
-    "calibration.old",
-    "the calibration is {age_days} days old, at most {limit_days} are allowed",
-    age_days=Number(0),
-    limit_days=Number(),
+    "calibration.old", "the calibration is {age_days} days old, at most {limit_days} are allowed", age_days=Number(0)
 )
 CHECKS_FAILED = define(
     "calibration.checks_failed",
@@ -279,12 +258,8 @@ LAY_BALL = define(
     "calibration.lay_ball",
     "Lay the ball {right_mm} mm to the right and {down_mm} mm down, as the image shows it, of its first place, and "
     "take your hands away.",
-    right_mm=Number(),
-    down_mm=Number(),
 )
 NOT_WAITING = define("calibration.not_waiting", "nothing waits for the ball at this moment; look at the run again")
 NOT_BEGUN = define("calibration.not_begun", "nothing was begun with the ball; begin it first")
 CALLED_OFF = define("calibration.called_off", "called off: nothing was stored")
-BALL_LATE = define(
-    "calibration.ball_late", "nobody laid the ball within {limit_min} min; begin again", limit_min=Number()
-)
+BALL_LATE = define("calibration.ball_late", "nobody laid the ball within {limit_min} min; begin again")

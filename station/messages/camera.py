@@ -10,7 +10,6 @@ NO_FRAME = define(
     "camera.no_frame",
     "camera {camera}: no new frame within {limit_s} s; {reasons}. {remedy}, then `station devices check`",
     camera=Nested(),
-    limit_s=Number(),
     reasons=Listed("; "),
     remedy=Nested(),
 )
@@ -19,11 +18,7 @@ NOTHING_SENT = define("camera.nothing_sent", "it has sent nothing yet")
 REMEDY_CABLE = define("camera.remedy_cable", "Check its cable and its light")
 
 NO_FIRST_FRAME = define(
-    "camera.no_first_frame",
-    "camera {camera}: no frame within {limit_s} s; {reason}",
-    camera=Nested(),
-    limit_s=Number(),
-    reason=Nested(),
+    "camera.no_first_frame", "camera {camera}: no frame within {limit_s} s; {reason}", camera=Nested(), reason=Nested()
 )
 NOT_PLUGGED_IN = define(
     "camera.not_plugged_in", "no DIGIT {serial} is plugged in (found: {found}); check cable and serial number"
@@ -57,7 +52,6 @@ TWIN_NO_FIRST_FRAME = define(
     "camera.twin_no_first_frame",
     "camera twin at {address}: no frame within {limit_s} s; {reason}. Start it with `station twin`, or correct "
     "camera.twin in station.yaml",
-    limit_s=Number(),
     reason=Nested(),
 )
 TWIN_LIGHT_NOT_SET = define(
@@ -73,7 +67,7 @@ TWIN_TRUTH_NOT_READ = define(
     reason=Nested(),
 )
 LINK_CLOSED = define("camera.link_closed", "the connection was closed")
-LINK_SILENT = define("camera.link_silent", "nothing came for {limit_s} s", limit_s=Number())
+LINK_SILENT = define("camera.link_silent", "nothing came for {limit_s} s")
 LINK_FAILED = define("camera.link_failed", "the connection failed: {reason}")
 LONG_HEADER = define(
     "camera.long_header",
@@ -133,29 +127,17 @@ BAD_FRAMES = define_plural(
     "camera: {number} bad frame ({faults}); check its cable and its light, then `station devices check`",
     "camera: {number} bad frames in a row ({faults}); check its cable and its light, then `station devices check`",
     "number",
-    number=Number(),
     faults=Listed(),
 )
 
-CHECK_FOUND = define(
-    "camera.check_found",
-    "{camera}, {width_px}x{height_px}, {rate} frames/s",
-    width_px=Number(),
-    height_px=Number(),
-    rate=Number(1),
-)
+CHECK_FOUND = define("camera.check_found", "{camera}, {width_px}x{height_px}, {rate} frames/s", rate=Number(1))
 CHECK_REVISION = define(
-    "camera.check_revision",
-    "{camera}, revision {revision}, {width_px}x{height_px}, {rate} frames/s",
-    width_px=Number(),
-    height_px=Number(),
-    rate=Number(1),
+    "camera.check_revision", "{camera}, revision {revision}, {width_px}x{height_px}, {rate} frames/s", rate=Number(1)
 )
 CHECK_BAD = define(
     "camera.check_bad",
     "{found}; of {number} frames {bad} are bad: {faults}",
     found=Nested(),
-    number=Number(),
     bad=Number(),
     faults=Listed(),
 )

@@ -1,6 +1,6 @@
 """Messages of the line's CAN: the bus, its nodes and the reject actuations."""
 
-from station.messages.message import Nested, Number, define
+from station.messages.message import Name, Nested, Number, define
 
 # The interface.
 INTERFACE = define("can.interface", "the CAN interface {interface} {channel}")
@@ -162,20 +162,16 @@ FIRED_LATE = define(
     "can.fired_late",
     "the gate fired {counts} counts after count {at_count}; check the encoder and can.tolerance_counts",
     counts=Number(),
-    at_count=Number(),
 )
 FIRED_EARLY = define(
     "can.fired_early",
     "the gate fired {counts} counts before count {at_count}; check the encoder and can.tolerance_counts",
     counts=Number(),
-    at_count=Number(),
 )
 ORDER_LATE = define(
     "can.order_late",
     "count {at_count} was past when the gate got the order, at {now_count}; the fruit went by: raise "
     "can.distance_counts or shorten the inspection",
-    at_count=Number(),
-    now_count=Number(),
 )
 GATE_FULL = define("can.gate_full", "the gate has no place left for an order; slow the line down")
 LANE_REFUSED = define(
@@ -190,37 +186,26 @@ ORDER_MALFORMED = define(
     "expected a sequence from 1 to {most}, a lane from 1 to {lanes} and a count from 0 to {most}, found {sequence}, "
     "{lane} and {at_count}",
     lanes=Number(),
+    at_count=Name(),
 )
 COUNT_PAST = define(
     "can.count_past",
     "count {at_count} is past, the belt is at {now_count}; nothing was ordered and the fruit went by: shorten the "
     "inspection, or raise the distance from the nest to the gate",
-    at_count=Number(),
-    now_count=Number(),
 )
 COUNT_TOO_FAR = define(
     "can.count_too_far",
     "count {at_count} is further ahead than the way from the nest to the gate, the belt is at {now_count}: the encoder "
     "was reset, or not known at the trigger; look at the fruit",
-    at_count=Number(),
-    now_count=Number(),
 )
 NOT_CONFIRMED = define(
     "can.not_confirmed",
     "the gate did not confirm the order within {limit_s} s; check the gate, and treat the fruit as not diverted",
-    limit_s=Number(),
 )
 NOT_REPORTED = define(
-    "can.not_reported",
-    "the belt is past count {at_count} and the gate did not report; check the gate and the fruit",
-    at_count=Number(),
+    "can.not_reported", "the belt is past count {at_count} and the gate did not report; check the gate and the fruit"
 )
-BELT_SLOW = define(
-    "can.belt_slow",
-    "the belt did not reach count {at_count} within {limit_s} s; check that it runs",
-    at_count=Number(),
-    limit_s=Number(),
-)
+BELT_SLOW = define("can.belt_slow", "the belt did not reach count {at_count} within {limit_s} s; check that it runs")
 GATE_LOST = define("can.gate_lost", "the gate was lost before it reported ({why}); look at the fruit", why=Nested())
 UNORDERED_REPORT = define(
     "can.unordered_report",

@@ -24,24 +24,20 @@ TEXT = define("expect.text", "a text")
 PATH = define("expect.path", "a path")
 TEXT_OF = define("expect.text_of", "{text} of {length}", text=Nested(), length=Nested())
 MATCHING = define("expect.matching", "{text} that matches {pattern}", text=Nested())
-CHARACTERS = define_plural("expect.characters", "{number} character", "{number} characters", "number", number=Number())
+CHARACTERS = define_plural("expect.characters", "{number} character", "{number} characters", "number")
 CHARACTERS_LEAST = define_plural(
-    "expect.characters_least", "at least {number} character", "at least {number} characters", "number", number=Number()
+    "expect.characters_least", "at least {number} character", "at least {number} characters", "number"
 )
 CHARACTERS_MOST = define_plural(
-    "expect.characters_most", "at most {number} character", "at most {number} characters", "number", number=Number()
+    "expect.characters_most", "at most {number} character", "at most {number} characters", "number"
 )
 CHARACTERS_BETWEEN = define("expect.characters_between", "{least} to {most} characters", least=Number(), most=Number())
 LIST = define("expect.list", "a list")
 LIST_OF = define("expect.list_of", "a list of {length}", length=Nested())
 EACH = define("expect.each", "{list}, each {item}", list=Nested(), item=Nested())
-ITEMS = define_plural("expect.items", "{number} item", "{number} items", "number", number=Number())
-ITEMS_LEAST = define_plural(
-    "expect.items_least", "at least {number} item", "at least {number} items", "number", number=Number()
-)
-ITEMS_MOST = define_plural(
-    "expect.items_most", "at most {number} item", "at most {number} items", "number", number=Number()
-)
+ITEMS = define_plural("expect.items", "{number} item", "{number} items", "number")
+ITEMS_LEAST = define_plural("expect.items_least", "at least {number} item", "at least {number} items", "number")
+ITEMS_MOST = define_plural("expect.items_most", "at most {number} item", "at most {number} items", "number")
 ITEMS_BETWEEN = define("expect.items_between", "{least} to {most} items", least=Number(), most=Number())
 MAPPING = define("expect.mapping", "a mapping")
 MAPPING_WITH = define("expect.mapping_with", "a mapping with {names}")

@@ -5,7 +5,6 @@ from station.messages.message import Listed, Nested, Number, define
 BAD_FRAMES = define(
     "grip.bad_frames",
     "the camera gave {number} bad frames in a row ({faults}); see `station devices check`",
-    number=Number(),
     faults=Listed(),
 )
 UNSEEN_CONTACT = define(
@@ -18,8 +17,6 @@ NOTHING_TOUCHED = define(
     "grip.nothing_touched",
     "nothing was touched from {largest_mm} down to {smallest_mm} mm: check that a fruit ({recipe}) is in the nest, "
     "and that the arm is there",
-    largest_mm=Number(),
-    smallest_mm=Number(),
 )
 CALLED_OFF = define("grip.called_off", "the grip was called off")
 NOT_OPENED = define(

@@ -1,9 +1,9 @@
 """Messages of the gripper: causes and remedies of its faults, its state, and what answers on its wire."""
 
-from station.messages.message import Nested, Number, define
+from station.messages.message import Name, Nested, Number, define
 
 FAULT = define("gripper.fault", "gripper: {cause}; {remedy}", cause=Nested(), remedy=Nested())
-REPORTED = define("gripper.reported", "{cause} (fault {number}, {name})", cause=Nested())
+REPORTED = define("gripper.reported", "{cause} (fault {number}, {name})", cause=Nested(), number=Name())
 
 ACTIVATE_FIRST = define("gripper.activate_first", "it received a motion before its activation was complete")
 ACTIVATION_BIT = define("gripper.activation_bit", "it received a motion without being activated")
@@ -83,24 +83,16 @@ STATE_AT_POSITION = define("gripper.state_at_position", "and it reports this as 
 WIDTH_OUT_OF_REACH = define(
     "gripper.width_out_of_reach",
     "a width of {width_mm} mm was requested, its fingers reach 0 to {widest_mm} mm",
-    width_mm=Number(),
     widest_mm=Number(2),
 )
 REMEDY_WIDTH = define("gripper.remedy_width", "correct the recipe's widths or the gripper's calibration")
 SPEED_OUT_OF_RANGE = define(
     "gripper.speed_out_of_range",
     "a speed of {speed_mm_s} mm/s was requested, it moves at {slowest_mm_s} to {fastest_mm_s} mm/s",
-    speed_mm_s=Number(),
-    slowest_mm_s=Number(),
-    fastest_mm_s=Number(),
 )
 REMEDY_SPEED = define("gripper.remedy_speed", "correct the recipe's speed")
 FORCE_OUT_OF_RANGE = define(
-    "gripper.force_out_of_range",
-    "a force of {force_n} N was requested, it grips with {weakest_n} to {strongest_n} N",
-    force_n=Number(),
-    weakest_n=Number(),
-    strongest_n=Number(),
+    "gripper.force_out_of_range", "a force of {force_n} N was requested, it grips with {weakest_n} to {strongest_n} N"
 )
 REMEDY_FORCE = define(
     "gripper.remedy_force",
@@ -109,7 +101,7 @@ REMEDY_FORCE = define(
 
 PLACE_URCAP = define("gripper.place_urcap", "URCap at {address}")
 PLACE_MODBUS_RTU = define("gripper.place_modbus_rtu", "Modbus RTU unit {unit} at {address}", unit=Number())
-SILENT = define("gripper.silent", "{place} did not answer within {limit_s} s", place=Nested(), limit_s=Number())
+SILENT = define("gripper.silent", "{place} did not answer within {limit_s} s", place=Nested())
 REMEDY_SILENT_ROBOT = define(
     "gripper.remedy_silent_robot", "check that the robot is powered and the gripper shows a steady LED"
 )
@@ -147,12 +139,7 @@ NOT_MODBUS_RTU = define(
     "{place} sent what is no Modbus RTU answer: {octets}",
     place=Nested(),
 )
-MODBUS_EXCEPTION = define(
-    "gripper.modbus_exception",
-    "{place} answered with exception {number}",
-    place=Nested(),
-    number=Number(),
-)
+MODBUS_EXCEPTION = define("gripper.modbus_exception", "{place} answered with exception {number}", place=Nested())
 WRONG_FUNCTION = define(
     "gripper.wrong_function",
     "{place} answered function {found} instead of {expected}",

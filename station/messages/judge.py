@@ -26,8 +26,6 @@ WRONG_WIDTH = define(
     "judge.wrong_width",
     "The fruit is {width_mm} mm wide; {recipe} is meant for {smallest_mm} to {largest_mm} mm.",
     width_mm=Number(1),
-    smallest_mm=Number(),
-    largest_mm=Number(),
 )
 NO_LENGTH = define("judge.no_length", "The PLC gave no length of the fruit, and its limits depend on the length.")
 NO_CLASS = define("judge.no_class", "The PLC gave no size class of the fruit, and its limits depend on the class.")
@@ -35,20 +33,13 @@ LENGTH_UNEXPECTED = define(
     "judge.length_unexpected",
     "The PLC gave a length of {length_mm} mm; {recipe} is expected with {smallest_mm} to {largest_mm} mm.",
     length_mm=Number(1),
-    smallest_mm=Number(),
-    largest_mm=Number(),
 )
-CLASS_UNLISTED = define(
-    "judge.class_unlisted", "The PLC gave the size class {number}, which the recipe does not list.", number=Number()
-)
+CLASS_UNLISTED = define("judge.class_unlisted", "The PLC gave the size class {number}, which the recipe does not list.")
 SIZE_CONTRADICTS = define(
     "judge.size_contradicts",
     "The PLC gave a length of {length_mm} mm and the size class {number}, which is for {smallest_mm} to "
     "{largest_mm} mm: they contradict each other.",
     length_mm=Number(1),
-    number=Number(),
-    smallest_mm=Number(),
-    largest_mm=Number(),
 )
 LENGTH_OF_ANOTHER = define(
     "judge.length_of_another",
@@ -59,7 +50,6 @@ LENGTH_OF_ANOTHER = define(
 CLASS_OF_ANOTHER = define(
     "judge.class_of_another",
     "The PLC gave the size class {number}, and the fruit is {width_mm} mm wide: that is another fruit's size.",
-    number=Number(),
     width_mm=Number(1),
 )
 
@@ -77,7 +67,6 @@ LIMIT_WITHOUT_SIZE = define(
 AREA_AND_LIMIT = define(
     "judge.area_and_limit",
     "The area at {closing_mm} mm of closing is {area_mm2} ± {uncertainty_mm2} mm²; {limit}.",
-    closing_mm=Number(),
     area_mm2=Number(1),
     uncertainty_mm2=Number(1),
     limit=Nested(),
@@ -85,7 +74,6 @@ AREA_AND_LIMIT = define(
 AREA_OVER = define(
     "judge.area_over",
     "The area at {closing_mm} mm of closing is at least {area_mm2} mm²; {limit}: it is over the limit.",
-    closing_mm=Number(),
     area_mm2=Number(1),
     limit=Nested(),
 )
@@ -93,7 +81,6 @@ AREA_NEAR = define(
     "judge.area_near",
     "The area at {closing_mm} mm of closing is {area_mm2} ± {uncertainty_mm2} mm²; {limit}: it is not surely within "
     "the limit.",
-    closing_mm=Number(),
     area_mm2=Number(1),
     uncertainty_mm2=Number(1),
     limit=Nested(),
@@ -102,12 +89,11 @@ AREA_SMALL = define(
     "judge.area_small",
     "The area at {closing_mm} mm of closing is {area_mm2} ± {uncertainty_mm2} mm², which may be less than any fruit's, "
     "{least_mm2} mm²: not all of the contact was seen.",
-    closing_mm=Number(),
     area_mm2=Number(1),
     uncertainty_mm2=Number(1),
     least_mm2=Number(1),
 )
-AREA_UNKNOWN = define("judge.area_unknown", "The area at {closing_mm} mm is unknown.", closing_mm=Number())
+AREA_UNKNOWN = define("judge.area_unknown", "The area at {closing_mm} mm is unknown.")
 GROWTH_OVER = define(
     "judge.growth_over",
     "From {from_mm} to {to_mm} mm of closing the area grows by {growth} ± {uncertainty} mm² per mm, over the limit "
@@ -178,14 +164,12 @@ NOT_RISING = define_plural(
     "The area does not rise with the closing: {points} do not fit the other steps.",
     "number",
     points=Listed(),
-    number=Number(),
 )
 LATE_ONSET = define(
     "judge.late_onset",
     "The onset is doubtful: the area rises as if the contact had begun at {begins_mm} mm of closing; at most "
     "{allowed_mm} mm is allowed.",
     begins_mm=Number(1),
-    allowed_mm=Number(),
 )
 NO_ONSET = define("judge.no_onset", "The onset is doubtful: the area does not rise with the closing.")
 
@@ -210,7 +194,6 @@ STOPPED_CLOSING = define(
     "judge.stopped_closing",
     "No further step was made at {closing_mm} mm of closing: that is the recipe's closing limit of {limit_mm} mm.",
     closing_mm=Number(1),
-    limit_mm=Number(),
 )
 STOPPED_UNTRUSTED = define(
     "judge.stopped_untrusted",
@@ -242,5 +225,4 @@ STEPS_ENDED = define(
     "judge.steps_ended",
     "The steps ended at {reached_mm} mm of closing, before {wanted_mm} mm, and nothing says why.",
     reached_mm=Number(1),
-    wanted_mm=Number(),
 )

@@ -17,10 +17,7 @@ JOG_WIDTH = define(
     "maintenance.jog_width", "to jog the gripper: expected a width where it is to go to one, and none elsewhere"
 )
 JOG_TOO_WIDE = define(
-    "maintenance.jog_too_wide",
-    "the fingers open to {widest_mm} mm, not to {width_mm} mm",
-    widest_mm=Number(1),
-    width_mm=Number(),
+    "maintenance.jog_too_wide", "the fingers open to {widest_mm} mm, not to {width_mm} mm", widest_mm=Number(1)
 )
 JOG_MOVING = define("maintenance.jog_moving", "the fingers are already moving: wait for them, or stop them")
 NO_GOLDEN = define(

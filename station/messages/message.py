@@ -1,5 +1,6 @@
 """Message: what the station says, as an id with typed parameters; a sentence is made where somebody reads it."""
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from string import Formatter
@@ -33,11 +34,7 @@ class Message(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A number.
-
-    Attributes:
-        digits: behind the decimal sign; None for as few as it has, six figures at most.
-    """
+    """A number, with so many digits behind the decimal sign; None for as few as it has, six figures at most."""
 
     digits: int | None = None
 
@@ -54,11 +51,7 @@ class Nested:
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """Several messages, one after the other.
-
-    Attributes:
-        separator: between two.
-    """
+    """Several messages, one after the other, with a separator between two."""
 
     separator: str = ", "
 
@@ -108,15 +101,17 @@ class Definition:
 
 
 _DEFINITIONS: dict[str, Definition] = {}
+_IS_NUMBER = re.compile(r"_(mm|mm2|mm_s|s|ms|min|h|days|px|bytes|mb|kib|hz|n|count|counts|levels)$|^number$")
+"""The names of parameters that are a `Number()` where their kind is left out: they carry a unit, see docs/units.md."""
 
 
 def define(id: str, english: str, **parameters: Kind) -> Definition:  # noqa: A002 (the field's word, and positional)
-    """Define a message; Babel finds the call and takes id and sentence from it.
+    """Define a message of a unique id; Babel finds the call and takes id and sentence from it.
 
     Args:
-        id: unique.
         english: the sentence, each parameter in braces.
-        parameters: what kind each of them is; one that is left out is a `Name`.
+        parameters: what kind each of them is; one that is left out is a `Number()` if its name carries a unit, else a
+            `Name`.
 
     Raises:
         ValueError: the id is taken, or a parameter is in no braces.
@@ -125,29 +120,27 @@ def define(id: str, english: str, **parameters: Kind) -> Definition:  # noqa: A0
 
 
 def define_plural(id: str, english: str, plural: str, counted: str, **parameters: Kind) -> Definition:  # noqa: A002
-    """Define a message whose form depends on a number.
+    """Define a message whose form depends on a number, else as `define`.
 
     Args:
-        id: unique.
         english: the sentence for one.
         plural: the sentence for all other numbers.
         counted: the parameter that decides.
-        parameters: what kind each of them is; one that is left out is a `Name`.
 
     Raises:
         TypeError: what decides is no number among the parameters.
         ValueError: the id is taken, or a parameter is in no braces.
     """
-    if not isinstance(parameters.get(counted), Number):
+    all_of_them = _with_names({counted: Number(), **parameters}, english)
+    if not isinstance(all_of_them[counted], Number):
         raise TypeError(f"{id}: {counted} is no number among its parameters")
-    all_of_them = _with_names(parameters, english)
     if missing := (all_of_them.keys() - {counted}) ^ (fields(plural) - {counted}):
         raise ValueError(f"{id}: the two forms differ in {sorted(missing)}")
     return _registered(Definition(id, english, all_of_them, plural, counted))
 
 
 def _with_names(parameters: Mapping[str, Kind], english: str) -> Mapping[str, Kind]:
-    return {**dict.fromkeys(fields(english), Name()), **parameters}
+    return {name: Number() if _IS_NUMBER.search(name) else Name() for name in fields(english)} | dict(parameters)
 
 
 def fields(sentence: str) -> set[str]:
@@ -188,11 +181,7 @@ class Renderer:
     """A number with so many digits behind the decimal sign, None for as few as it has."""
 
     def sentence(self, message: Message) -> str:
-        """Write a message as a sentence; one of an unknown id as that id with its parameters.
-
-        Args:
-            message: what was said.
-        """
+        """Write a message as a sentence; one of an unknown id as that id with its parameters."""
         known = definition(message.id)
         if known is None or message.parameters.keys() != known.parameters.keys():
             return f"{message.id} {' '.join(f'{name}={value}' for name, value in message.parameters.items())}".strip()
@@ -226,30 +215,18 @@ VERBATIM = define("text.verbatim", "{text}")
 
 
 def verbatim(text: str) -> Message:
-    """Make a message of words that are not the station's own.
-
-    Args:
-        text: shown as it is in every language.
-    """
+    """Make a message of words that are not the station's own: they are shown as they are in every language."""
     return VERBATIM(text=text)
 
 
 def message_of(error: BaseException) -> Message:
-    """Return what an error says: its message, or its own words.
-
-    Args:
-        error: any.
-    """
+    """Return what an error says: its message, or its own words."""
     said = getattr(error, "message", None)
     return said if isinstance(said, Message) else verbatim(str(error) or type(error).__name__)
 
 
 def message_in(text: str) -> Message | None:
-    """Read a message that a text field holds as JSON; the words of versions before messages as they are.
-
-    Args:
-        text: empty for no message.
-    """
+    """Read a message that a text field holds as JSON, empty for none; words of versions before messages as they are."""
     try:
         return Message.model_validate_json(text) if text else None
     except ValidationError:
@@ -262,11 +239,7 @@ def text_of(message: Message | None) -> str:
 
 
 def joined(messages: Sequence[Message]) -> Message:
-    """Make one message of several sentences.
-
-    Args:
-        messages: one or more; one alone is returned as it is.
-    """
+    """Make one message of one or more sentences; one alone is returned as it is."""
     return messages[0] if len(messages) == 1 else SENTENCES(sentences=tuple(messages))
 
 

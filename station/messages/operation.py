@@ -23,25 +23,20 @@ PROCESS_RESTARTED = define(
     "operation.process_restarted",
     "the process {process} was started again {times} times within {within_s} s",
     times=Number(),
-    within_s=Number(),
 )
 CLOCK_FORWARD = define("operation.clock_forward", "the machine's clock was set forward by {step_s} s", step_s=Number(0))
 CLOCK_BACK = define("operation.clock_back", "the machine's clock was set back by {step_s} s", step_s=Number(0))
-MANY_UNJUDGED = define("operation.many_unjudged", "the last {number} fruit could not be judged", number=Number())
-MANY_FAILED = define(
-    "operation.many_failed", "{failed} of the last {number} fruit failed", failed=Number(), number=Number()
-)
+MANY_UNJUDGED = define("operation.many_unjudged", "the last {number} fruit could not be judged")
+MANY_FAILED = define("operation.many_failed", "{failed} of the last {number} fruit failed", failed=Number())
 LIGHT_DRIFTS = define(
     "operation.light_drifts",
     "the light differs from the golden reference's by {drift_levels} grey levels; {limit_levels} are too many",
     drift_levels=Number(0),
-    limit_levels=Number(),
 )
 REFERENCE_OLD = define(
     "operation.reference_old",
     "the reference was {age_s} s old at the last step, at most {limit_s} s are allowed",
     age_s=Number(0),
-    limit_s=Number(),
 )
 JAWS_NOT_OPEN = define(
     "operation.jaws_not_open",
@@ -80,5 +75,4 @@ INSPECTION_TOO_LONG = define(
     "recipe {recipe}: an inspection may take {needed_s} s here, expected at most {limit_s} s; use fewer steps, a "
     "shorter settle time or fewer frames",
     needed_s=Number(0),
-    limit_s=Number(),
 )

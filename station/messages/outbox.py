@@ -8,7 +8,6 @@ WAITING = define_plural(
     "{destination}: {number} entry waits, for {age_s} s",
     "{destination}: {number} entries wait, for {age_s} s",
     "number",
-    number=Number(),
     age_s=Number(0),
 )
 WAITING_UNKNOWN = define(

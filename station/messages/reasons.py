@@ -41,10 +41,6 @@ SIZE_UNKNOWN = define("reason.size_unknown", "The recipe needs the fruit's size,
 
 
 def reason_message(code: str) -> Message:
-    """Return a reason's sentence; the code itself if it is not one of this version's.
-
-    Args:
-        code: as published to the PLC.
-    """
+    """Return the sentence of a reason as published to the PLC; the code itself if this version does not have it."""
     known = definition(f"reason.{code}")
     return verbatim(code) if known is None else known()

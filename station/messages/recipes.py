@@ -16,14 +16,10 @@ MOVED = define(
     before=Number(),
 )
 ANOTHER = define(
-    "recipe.another",
-    "the PLC's number {number} is {now} now, and no longer {before}; choose a recipe again",
-    number=Number(),
+    "recipe.another", "the PLC's number {number} is {now} now, and no longer {before}; choose a recipe again"
 )
 GONE = define(
-    "recipe.gone",
-    "recipe {recipe} with the PLC's number {number} is no longer in force; choose a recipe again",
-    number=Number(),
+    "recipe.gone", "recipe {recipe} with the PLC's number {number} is no longer in force; choose a recipe again"
 )
 STORED_ONES = define("recipe.stored_ones", "the recipes in force are those stored in {folder}: {why}", why=Nested())
 
@@ -124,7 +120,6 @@ NUMBER_TAKEN = define(
     "recipe.number_taken",
     "recipe {recipe}, revision {revision}: its PLC number {number} is that of the approved {other}",
     revision=Number(),
-    number=Number(),
 )
 RETIRED_ALREADY = define(
     "recipe.retired_already",

@@ -43,8 +43,8 @@ NUMBERS_USED_UP = define("records.numbers_used_up", "all {largest} sequence numb
 NUMBER_GIVEN = define("records.number_given", "{number} was given already", number=Number(0))
 NO_RECORDS = define("records.no_records", "there is no {path}")
 CLOSED = define("records.closed", "they are closed")
-TOO_SLOW = define("records.too_slow", "the disk did not take it within {limit_s} s", limit_s=Number())
-NO_ANSWER = define("records.no_answer", "no answer within {limit_s} s", limit_s=Number())
+TOO_SLOW = define("records.too_slow", "the disk did not take it within {limit_s} s")
+NO_ANSWER = define("records.no_answer", "no answer within {limit_s} s")
 NEWER_SCHEMA = define("records.newer_schema", "{path} has the schema {schema} of a newer fruit-station")
 NOT_MIGRATED = define(
     "records.not_migrated", "the database could not be brought from schema {before} to {after}: {words}"

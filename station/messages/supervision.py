@@ -4,8 +4,8 @@ from station.messages.message import Listed, Nested, Number, define
 
 NOT_RUNNING = define("supervision.not_running", "is not running")
 ENDED = define("supervision.ended", "ended with {how}")
-NOT_READY = define("supervision.not_ready", "was not ready after {limit_s} s", limit_s=Number())
-NO_PROGRESS = define("supervision.no_progress", "made no progress for {limit_s} s", limit_s=Number())
+NOT_READY = define("supervision.not_ready", "was not ready after {limit_s} s")
+NO_PROGRESS = define("supervision.no_progress", "made no progress for {limit_s} s")
 DID_NOT_START = define(
     "supervision.did_not_start",
     "the process {process} {trouble} before it was ready: {output}",
@@ -18,7 +18,6 @@ GIVEN_UP = define(
     " cause in its log and restart the station",
     trouble=Nested(),
     restarts=Number(0),
-    within_s=Number(),
 )
 ALL_GIVEN_UP = define(
     "supervision.all_given_up",

@@ -6,12 +6,7 @@ from station.messages.outbox import FAULT
 
 
 class OutboxError(StationError):
-    """Another system cannot be reached now; its events are published later, in order.
-
-    Args:
-        cause: the fault.
-        remedy: what a person has to do.
-    """
+    """Another system cannot be reached now, for a cause with a remedy; its events are published later, in order."""
 
     def __init__(self, cause: Message, remedy: Message) -> None:
         super().__init__(FAULT(cause=cause, remedy=remedy))

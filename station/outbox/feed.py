@@ -61,11 +61,7 @@ class Batch(NamedTuple):
     """Time of the first of them; None if there is nothing to publish."""
 
     def known(self, positions: dict[str, int]) -> int | None:
-        """Return the last entry that a destination has; None if it has none of this lineage.
-
-        Args:
-            positions: the destination's last entry, by origin.
-        """
+        """Return the last entry of this lineage that a destination has, by its positions; None if there is none."""
         for origin in self.lineage:
             if origin.id in positions:
                 return min(positions[origin.id], self.last if origin.last_entry is None else origin.last_entry)
@@ -73,10 +69,7 @@ class Batch(NamedTuple):
 
 
 def read_batch(folder: Path, station: str, after: int, limit: int = LARGEST_BATCH) -> Batch:
-    """Read the events after an entry.
-
-    Args:
-        after: the last entry that was published.
+    """Read the events after the last entry that was published.
 
     Raises:
         RecordsError: there are no records yet, or they cannot be read.

@@ -27,11 +27,7 @@ _AT_LEAST_ONCE = 1
 
 
 class Mqtt:
-    """MQTT publisher.
-
-    Args:
-        folder: stores the position: a broker stores none.
-    """
+    """MQTT publisher. Its folder stores the position: a broker stores none."""
 
     name = NAME
 
@@ -78,11 +74,7 @@ class Session:
         self._client, self._root, self._path = client, root, position
 
     async def position(self, lineage: Batch) -> int:
-        """Return the last entry that was published; at the very first start the newest entry: history is not published.
-
-        Args:
-            lineage: any batch of the present database.
-        """
+        """Return the last entry that was published; at the very first start the newest: history is not published."""
         try:
             kept: dict[str, int] = json.loads(self._path.read_bytes())
         except FileNotFoundError:
@@ -95,11 +87,7 @@ class Session:
         return lineage.last if known is None and not kept else known or 0
 
     async def publish(self, batch: Batch) -> None:
-        """Publish a batch, each event after the broker has acknowledged the one before.
-
-        Args:
-            batch: the entries after the position.
-        """
+        """Publish the entries after the position, each event after the broker has acknowledged the one before."""
         for event in batch.events:
             now = datetime.now(UTC).isoformat(timespec="milliseconds")
             data = {"id": f"{event.data['station']}/{event.data['origin']}/{event.entry}", "sent": now, **event.data}

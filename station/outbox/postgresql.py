@@ -125,22 +125,14 @@ class Session:
         self._owner, self._connection, self._station = owner, connection, station
 
     async def position(self, lineage: Batch) -> int:
-        """Return the last entry that the database has; 0 if it has none of this lineage.
-
-        Args:
-            lineage: any batch of the present database.
-        """
+        """Return the last entry that the database has; 0 if it has none of this lineage."""
         query = "SELECT origin, last_entry FROM stations WHERE station = %s"
         rows = await (await self._connection.execute(query, (self._station,))).fetchall()
         await self._connection.commit()
         return lineage.known(dict(rows)) or 0
 
     async def publish(self, batch: Batch) -> None:
-        """Write a batch and its position: all of it, or nothing.
-
-        Args:
-            batch: the entries after the position.
-        """
+        """Write the entries after the position, and their position: all of it, or nothing."""
         try:
             await self._write(batch.events)
         except (psycopg.DataError, psycopg.IntegrityError) as error:

@@ -38,11 +38,9 @@ class Session(Protocol):
 
     async def publish(self, batch: Batch) -> None:
         """Publish a batch; it and its position are durable when this returns."""
-        ...
 
     async def idle(self, pause_s: float) -> None:
         """Wait while there is nothing new; raises if the connection is lost."""
-        ...
 
 
 class Destination(Protocol):
@@ -57,11 +55,7 @@ class Destination(Protocol):
 
 
 class Publisher:
-    """Publisher for one destination.
-
-    Args:
-        longest_pause_s: between two attempts to reach it.
-    """
+    """Publisher for one destination, with growing pauses between two attempts to reach it."""
 
     def __init__(self, folder: Path, station: str, destination: Destination, longest_pause_s: float) -> None:
         self.destination = destination
@@ -160,11 +154,7 @@ def destinations(settings: OutboxSettings, home: Path) -> list[Destination]:
 
 
 async def run_outbox(settings: OutboxSettings, home: Path, progress: Callable[[], None] = lambda: None) -> None:
-    """Publish to every destination until cancelled, and write the status.
-
-    Args:
-        progress: called while everything runs.
-    """
+    """Publish to every destination until cancelled, and write the status; call `progress` while everything runs."""
     folder = records_folder(home)
     chosen = destinations(settings, home)
     tellers = [Publisher(folder, settings.station, each, settings.longest_pause_s) for each in chosen]

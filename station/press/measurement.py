@@ -8,13 +8,10 @@ from station.vision.step import measure_step
 
 
 class PressMeasurement:
-    """Measurement of one press against one reference. Not safe for use from several threads at once.
+    """Measurement of one press by a method prepared for its reference. Not safe for use from several threads at once.
 
     The jaws may open again while the onset is searched, so each step is measured by itself then. From `follow` on the
     compression only rises: each step is measured with the contact of the step before.
-
-    Args:
-        method: prepared for the reference.
     """
 
     def __init__(self, method: Method) -> None:
@@ -30,31 +27,19 @@ class PressMeasurement:
         self._known.clear()
 
     def follow(self, first: Contact) -> None:
-        """Measure every later step as a step of one press.
-
-        Args:
-            first: the contact of the press's first step.
-        """
+        """Measure every later step as a step of one press, of which this is the first contact."""
         self._tracker = PressTracker(self._method, first)
         self._known.clear()
 
     def prepare_next(self, image: Image) -> None:
-        """Measure one frame of the next step while more are captured; `measure` then has less to do.
-
-        Args:
-            image: of the reference's shape; the same object comes with the step.
-        """
+        """Measure one frame of the next step, the same object, while more come, so that `measure` has less to do."""
         if self._tracker is not None:
             self._tracker.prepare_next(image)
         else:
             self._known[id(image)] = image, self._method.measure(image, firm_only=True)
 
     def seek(self, step: Step) -> MeasuredStep:
-        """Measure a step of the approach, where only a firm contact counts.
-
-        Args:
-            step: with frames of the reference's shape.
-        """
+        """Measure a step of the approach, where only a firm contact counts."""
         if self._tracker is not None or len(step.images) > 1:
             return self.measure(step)
         [image] = step.images
@@ -67,11 +52,7 @@ class PressMeasurement:
         return MeasuredStep(step, image, contact)
 
     def measure(self, step: Step) -> MeasuredStep:
-        """Find the contact in a step's frames.
-
-        Args:
-            step: with frames of the reference's shape.
-        """
+        """Find the contact in a step's frames, of the reference's shape."""
         image = step.image
         if self._tracker is not None:
             return MeasuredStep(step, image, self._tracker.measure_step(step.images, image))
@@ -85,12 +66,7 @@ class PressMeasurement:
 
 
 def measured_point(contact: Contact, closing_mm: float, mm_per_px: float) -> Measured:
-    """Return a contact as the judge takes it.
-
-    Args:
-        closing_mm: of its step, from the onset.
-        mm_per_px: the sensor's scale.
-    """
+    """Return a contact, at its step's closing from the onset, as the judge takes it."""
     changed_px = contact.changed_area_px
     return Measured(
         closing_mm=closing_mm,

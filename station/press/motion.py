@@ -38,14 +38,11 @@ GoesOn = Callable[[Step], Awaitable[bool]]
 
 
 async def sweep(rig: MovingRig, recipe: Recipe, measure: Measure) -> Met:
-    """Close from the present width without a stop until the newest frame shows a contact.
+    """Close from the present width without a stop until the newest frame, measured alone, shows a contact.
 
     The fingers wait for a measurement that is late, so that they are never more than `stop.MOST_UNSEEN_MM` and the way
     of one reaction further than what was measured, or than where they began while nothing is measured yet. Where every
     measurement is late, a frame of the waiting fingers is measured before they go on: so they get on all the same.
-
-    Args:
-        measure: gets one frame at a time.
 
     Raises:
         NothingTouchedError: nothing was touched down to the recipe's smallest width.

@@ -42,10 +42,7 @@ class Observer(Protocol):
 
 
 async def press(rig: MovingRig, recipe: Recipe, observer: Observer) -> None:
-    """Press once and release, whatever happens. Not idempotent: each call presses.
-
-    Args:
-        rig: with nothing between its fingers, or with a fruit that lies at the nest.
+    """Press what lies at the nest, if anything, and release, whatever happens. Not idempotent: each call presses.
 
     Raises:
         GripError: no sound frame came, nothing was touched, or the fingers or the arm did not return.
@@ -77,34 +74,21 @@ async def _start(rig: MovingRig, recipe: Recipe, observer: Observer) -> Step | N
 
 
 async def take_step(rig: Rig, recipe: Recipe, number: int, width_mm: float) -> Step:
-    """Go to a width, let fruit and gel settle, and take the recipe's frames.
-
-    Args:
-        width_mm: the width to ask for; less than 0 is 0.
-    """
+    """Go to a width (less than 0 is 0), let fruit and gel settle, and take the recipe's frames."""
     move = await rig.close_to(width_mm)
     await rig.settle()
     return Step(number, move, await rig.frames(recipe.imaging.frames_per_step))
 
 
 async def close_in_steps(rig: Rig, recipe: Recipe, start_mm: float, goes_on: GoesOn) -> None:
-    """Close by the recipe's steps, counted in measured widths from the first, until the recipe or the steps end it.
-
-    Args:
-        start_mm: the measured width of the press's first step.
-        goes_on: gets each step, and says whether another may be made.
-    """
+    """Close by the recipe's steps, in measured widths from the first step's, until the recipe or `goes_on` ends it."""
     for number in range(1, recipe.steps.number + 1):
         if not await goes_on(await take_step(rig, recipe, number, start_mm - number * recipe.steps.step_mm)):
             return
 
 
 async def back_off(rig: Rig, met: Met) -> Position:
-    """Open to where the sweep saw nothing touch.
-
-    Args:
-        met: where the sweep has met the fruit.
-    """
+    """Open to where the sweep saw nothing touch."""
     # A light contact begins unseen: half a count of room for it.
     from_mm = (met.width_mm if met.clear_mm is None else met.clear_mm) + rig.finest_step_mm / 2
     return await rig.open(min(from_mm, rig.widest_mm))
@@ -137,9 +121,6 @@ async def onset(rig: Rig, recipe: Recipe, opened: Position, measure: Measure, lo
 async def onset_again(rig: MovingRig, recipe: Recipe, met: Met, measure: Measure) -> Onset:
     """Find the onset of a fruit that was met before, from beside where it was; sweep where it is no longer there.
 
-    Args:
-        met: where it was met.
-
     Raises:
         NothingTouchedError, UnseenContactError: as `sweep`.
     """
@@ -152,11 +133,7 @@ async def onset_again(rig: MovingRig, recipe: Recipe, met: Met, measure: Measure
 
 
 async def onset_from(rig: Rig, recipe: Recipe, from_mm: float, lowest_mm: float, measure: Measure) -> Onset:
-    """Find the onset from a width at which nothing touches, without a sweep.
-
-    Args:
-        from_mm: where the search begins.
-        lowest_mm: where it ends in any case.
+    """Find the onset from a width at which nothing touches, down to `lowest_mm` at most, without a sweep.
 
     Raises:
         NothingTouchedError, UnseenContactError: as `sweep`.
@@ -168,11 +145,7 @@ async def onset_from(rig: Rig, recipe: Recipe, from_mm: float, lowest_mm: float,
 async def bracketed_onset_mm(
     rig: Rig, recipe: Recipe, untouched_mm: float, touched_mm: float, measure: Measure
 ) -> float:
-    """Find the onset between two measured steps, by full steps as finely as the fingers can.
-
-    Args:
-        untouched_mm: a width without contact.
-        touched_mm: a smaller one with contact.
+    """Find the onset between a step without and a narrower one with contact, by full steps as fine as the fingers go.
 
     Returns:
         Its measured width; the smaller one where nothing touches before.

@@ -16,7 +16,7 @@ from station.press.rig import Frame, GripError, Position, Rig, Step
 from station.settings.service import ReferenceSettings
 from station.vision.contact import Image, Method
 from station.vision.image_quality import DEAD_LED, light, sharpness
-from station.vision.methods import median_image
+from station.vision.median import median_image
 from station.vocabulary import Flag
 
 _SATURATED_LEVEL = 250
@@ -35,12 +35,7 @@ class JawsNotOpenError(GripError):
 
 
 def are_open(width_mm: float, widest_mm: float) -> bool:
-    """Whether a measured width is that of the open jaws.
-
-    Args:
-        width_mm: measured.
-        widest_mm: of the open jaws.
-    """
+    """Whether a measured width is that of the open jaws."""
     return width_mm >= widest_mm - _OPEN_WITHIN_MM
 
 
@@ -57,13 +52,7 @@ async def open_jaws(rig: Rig) -> Position:
 
 
 async def take_reference(rig: Rig, number: int) -> Step:
-    """Take frames of the untouched gel away from the nest, with the jaws open, and come back to the nest.
-
-    Args:
-        number: of frames.
-
-    Returns:
-        The frames as a step without contact.
+    """Take frames of the untouched gel away from the nest, with the jaws open, and come back: a step without contact.
 
     Raises:
         JawsNotOpenError: as `open_jaws`.
@@ -78,11 +67,7 @@ async def take_reference(rig: Rig, number: int) -> Step:
 
 
 def reference_image(frames: Sequence[Frame]) -> Image:
-    """Return the reference: the median of frames of the untouched gel.
-
-    Args:
-        frames: one or more, of one shape.
-    """
+    """Return the reference: the median of one or more frames, of one shape, of the untouched gel."""
     return median_image([frame.image for frame in frames])
 
 

@@ -47,11 +47,7 @@ def lowest_mm(recipe: Recipe) -> float:
 
 
 def nothing_touched(recipe: Recipe, at: Position | None = None) -> GripError:
-    """The error for fingers that have closed without a contact.
-
-    Args:
-        at: where they came to rest; None where the approach's end was reached count by count.
-    """
+    """The error for fingers that closed without a contact; `at` is None where the end was reached count by count."""
     if at is not None and at.held:
         return UnseenContactError(messages.UNSEEN_CONTACT(width_mm=at.width_mm))
     expected = recipe.expected_width

@@ -29,22 +29,17 @@ _SHORTEST_BASE = 8
 
 
 class RecipeEditor:
-    """Editor of a site's recipe files. Every method blocks.
-
-    Args:
-        folder: the site's recipe files; None for the shipped ones, which cannot be edited in place.
-    """
+    """Editor of a site's recipe files; the shipped ones, None, cannot be edited in place. Every method blocks."""
 
     def __init__(self, home: Path, folder: Path | None) -> None:
         self._home, self._folder = home, folder
         self._store = RecipeStore(home, folder)
 
     def edit(self, name: str, changes: Mapping[str, Any], person: Person, base: str = "") -> RecipeState:
-        """Change values in a recipe's file; comments remain. The file is then an unapproved draft.
+        """Change values, by their dotted paths, in a recipe's file; comments remain. It is then an unapproved draft.
 
         Args:
-            changes: new values by their dotted paths. person: the editor, and the reason. base: the content hash, or
-            its beginning, of the version that the editor has seen; empty for the present one.
+            base: content hash, or its beginning, of the version that the editor has seen; empty for the present one.
 
         Raises:
             BadInputError: the recipe would be invalid; the file is unchanged.
@@ -89,10 +84,7 @@ class RecipeEditor:
         return self._store.state(recipe.name)
 
     def revert(self, name: str, person: Person, revision: int | None = None) -> RecipeState:
-        """Put a revision's text back into the recipe's file; the present text is stored as a backup.
-
-        Args:
-            revision: None for the approved one.
+        """Put a revision's text, or else the approved one's, back into the file; store the present text as a backup.
 
         Raises:
             BadInputError: there is none.

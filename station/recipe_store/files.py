@@ -32,10 +32,7 @@ class Folder(NamedTuple):
 
 
 def read_folder(folder: Path | None) -> Folder:
-    """Read every recipe of a folder, also if some are invalid.
-
-    Args:
-        folder: the site's; None for the shipped recipes.
+    """Read every recipe of a site's folder, or the shipped recipes, also if some are invalid.
 
     Raises:
         SettingsError: the folder cannot be read or holds no recipe.
@@ -88,11 +85,7 @@ def locked(home: Path) -> Iterator[None]:
 
 
 def write_back(path: Path, text: str, home: Path) -> Path | None:
-    """Replace a recipe's file atomically; the present text is stored as a backup.
-
-    Args:
-        path: the recipe's file, existing or not.
-        home: the station's home folder, which contains the backups.
+    """Replace a recipe's file atomically; the present text is stored as a backup in the home folder.
 
     Returns:
         The backup; None if there was no file.

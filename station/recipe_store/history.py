@@ -24,22 +24,18 @@ class Person(NamedTuple):
 
 
 def read_revisions(connection: Connection, name: str = "") -> list[Revision]:
-    """Read the revisions by name, oldest first.
-
-    Args:
-        name: of one recipe; all if empty.
-    """
+    """Read the revisions of a recipe, or of all, by name, oldest first."""
     query = select(recipe_revisions).order_by(recipe_revisions.c.name, recipe_revisions.c.revision)
     if name:
         query = query.where(recipe_revisions.c.name == name)
-    return [_revision(row) for row in connection.execute(query).mappings()]
+    return [
+        Revision(**{**row, "status": Status(row["status"]), "origin": Origin(row["origin"])})
+        for row in connection.execute(query).mappings()
+    ]
 
 
 def submit(connection: Connection, text: str, recipe: Recipe, person: Person) -> Revision:
     """Store a recipe's file as a draft for another person to approve. Idempotent for the same content and author.
-
-    Args:
-        connection: in a write transaction.
 
     Raises:
         RecipeStoreError: it is approved already, or another person's draft waits.
@@ -70,7 +66,6 @@ def approve(connection: Connection, wanted: Revision, file: Recipe | None, perso
     """Put a draft in force from the next lot on; the revision approved before is retired.
 
     Args:
-        connection: in a write transaction.
         wanted: the draft, as the approver has seen it.
         file: the recipe's file now; None if it is invalid.
 
@@ -113,10 +108,6 @@ def approve(connection: Connection, wanted: Revision, file: Recipe | None, perso
 def retire(connection: Connection, wanted: Revision, person: Person) -> Revision:
     """Take a revision out of use: a draft is rejected; no lot begins with an approved one any more.
 
-    Args:
-        connection: in a write transaction.
-        wanted: a draft or an approved one.
-
     Raises:
         RecipeStoreError: it is retired already.
     """
@@ -129,10 +120,9 @@ def retire(connection: Connection, wanted: Revision, person: Person) -> Revision
 def store_approved(
     connection: Connection, text: str, recipe: Recipe, origin: Origin, who: str, reason: str
 ) -> Revision:
-    """Store a recipe that is approved by its origin, in place of the revision approved before.
+    """Store a recipe that is approved by its origin, in place of the revision approved before; within a transaction.
 
     Args:
-        connection: in a write transaction.
         origin: shipped or adopted.
         who: the distribution, or the station.
         reason: why it counts as approved.
@@ -205,7 +195,3 @@ def _note(connection: Connection, person: Person, action: str, of: Revision, old
 
 def _audited(revision: Revision) -> dict[str, Any]:
     return {"revision": revision.revision, "status": str(revision.status), "sha256": revision.sha256}
-
-
-def _revision(row: Any) -> Revision:
-    return Revision(**{**row, "status": Status(row["status"]), "origin": Origin(row["origin"])})

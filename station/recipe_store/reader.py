@@ -23,11 +23,7 @@ BASE = re.compile(r"^# base: sha256 ([0-9a-f]{64})\n", re.MULTILINE)
 
 
 class RecipeReader:
-    """Recipes of one station: the files that people edit, and the history of approved revisions.
-
-    Args:
-        folder: the site's recipe files; None for the shipped ones, which cannot be edited in place.
-    """
+    """Recipes of one station: the files that people edit, or those shipped, and the history of approved revisions."""
 
     def __init__(self, home: Path, folder: Path | None) -> None:
         self._home, self._folder, self._records = home, folder, records_folder(home)
@@ -61,10 +57,7 @@ class RecipeReader:
         return tuple(files), tuple(history)
 
     def history(self, name: str = "") -> list[Revision]:
-        """Return the revisions, oldest first; none before the history began.
-
-        Args:
-            name: of one recipe; all if empty.
+        """Return the revisions of a recipe, or of all, oldest first; none before the history began.
 
         Raises:
             RecordsError: they cannot be read.
@@ -103,10 +96,7 @@ class RecipeReader:
         raise BadInputError(messages.UNKNOWN_REVISION(recipe=shortened(name), revision=revision, known=known))
 
     def export_text(self, name: str, revision: int | None = None) -> str:
-        """Return a recipe's file; its first line names the version, so that `import_text` notices later changes.
-
-        Args:
-            revision: None for the present file.
+        """Return a recipe's present file, or a revision's; `import_text` notices later changes by its first line.
 
         Raises:
             BadInputError: there is none.

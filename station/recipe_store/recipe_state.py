@@ -83,13 +83,11 @@ class RecipeState:
 def recipe_states(
     found: Sequence[ValidFile], broken: Mapping[str, Sequence[Problem]], history: Sequence[Revision]
 ) -> tuple[RecipeState, ...]:
-    """Combine the files and the history, in the order of names.
+    """Combine the valid files, of different names, and the history, oldest first, in the order of names.
 
     Args:
-        found: the valid files, of different names.
-        broken: what is wrong with the others, by the files' stems. Any recipe without a good file may be the one of a
+        broken: what is wrong with the other files, by their stems. Any recipe without a good file may be the one of a
             file whose stem is no recipe's name.
-        history: all revisions, oldest first.
     """
     files = {file.recipe.name: file for file in found}
     names = dict.fromkeys(sorted({*files, *(each.name for each in history)}))

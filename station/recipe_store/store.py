@@ -31,9 +31,6 @@ class RecipeStore(RecipeReader):
         Shipped recipes count as approved by the distribution. When the history begins, the recipes that the station
         inspected by until then, or else the existing files, are adopted: their installer is responsible for them.
 
-        Args:
-            last_good: recipes that the station last inspected by, if known.
-
         Raises:
             SettingsError: the folder cannot be read, or holds no recipe at all.
             RecordsError: the history cannot be written.
@@ -81,10 +78,7 @@ class RecipeStore(RecipeReader):
                 return approve(connection, wanted, file, person)
 
     def retire(self, name: str, person: Person, revision: int | None = None) -> Revision:
-        """Take a revision out of use: no lot begins with it any more.
-
-        Args:
-            revision: None for the approved one.
+        """Take a revision, or else the approved one, out of use: no lot begins with it any more.
 
         Raises:
             BadInputError: there is none.

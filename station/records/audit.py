@@ -5,7 +5,7 @@ import json
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from sqlalchemy import Connection, Row, insert, select
+from sqlalchemy import Connection, Row, bindparam, insert, select
 
 from station.messages import records as messages
 from station.records.audit_head import FILE_NAME as HEAD_NAME
@@ -26,6 +26,9 @@ STATION = "station"
 """Actor, and role, where no person acts."""
 LONGEST_WORD, LONGEST_REASON = 64, 1000
 
+_LAST = select(audit).order_by(audit.c.seq.desc()).limit(1)
+_NEWER = select(audit.c.seq, audit.c.hash).where(audit.c.seq > bindparam("known")).order_by(audit.c.seq.desc()).limit(1)
+"""Made once: they run in each transaction."""
 _SPARE_NUMBERS = 1000
 """Numbers left free where the trail continues without its last rows: rows newer than the saved head had them."""
 _FORM = "fruit-station audit 1"
@@ -78,10 +81,7 @@ class AuditRow:
 
 
 def append_audit(connection: Connection, entry: AuditEntry) -> AuditRow:
-    """Append to the trail, within the transaction of the audited change: both are durable, or neither.
-
-    Args:
-        connection: in a write transaction: the writer's, or one of `writing_connection`.
+    """Append to the trail, within the write transaction of the audited change: both are durable, or neither.
 
     Raises:
         BadRecordError: a text is empty, too long or not printable, or a value has no JSON.
@@ -91,11 +91,7 @@ def append_audit(connection: Connection, entry: AuditEntry) -> AuditRow:
 
 
 def continue_audit(connection: Connection, known: Head | None) -> AuditRow | None:
-    """Append, at a start, a row that records the loss of rows that are known to have existed.
-
-    Args:
-        connection: in a write transaction.
-        known: the head stored outside the database.
+    """Append, at a start, a row if the head stored outside the database, or its absence, shows that rows are lost.
 
     Returns:
         That row, with the last row in this database as `old` and the last one known as `new`; None if no row is
@@ -113,12 +109,7 @@ def continue_audit(connection: Connection, known: Head | None) -> AuditRow | Non
 
 
 def note_unsigned(connection: Connection, known: Head | None) -> None:
-    """Append, at a start, a row if there are rows beyond the signed head: a killed station wrote them, or nobody knows.
-
-    Args:
-        connection: in a write transaction.
-        known: the head stored outside the database.
-    """
+    """Append, at a start, a row if there are rows beyond the signed head: of a killed station, or nobody knows."""
     last = last_row(connection)
     if known is not None and last is not None and last.seq > known.seq and has_row(connection, known):
         append_audit(connection, AuditEntry(STATION, STATION, UNSIGNED, "audit", "", _named(known), _named(last)))
@@ -128,7 +119,6 @@ def append_restored(connection: Connection, by: str, known: Head | None, new: di
     """Append, after a restored backup's last row, a row that records the restore; known newer rows leave a gap.
 
     Args:
-        by: the person's name.
         known: the head of the trail before the restore; None if there was none.
         new: what the row records of the backup.
 
@@ -150,32 +140,19 @@ def has_row(connection: Connection, head: Head) -> bool:
 
 
 def newer_head(connection: Connection, known: Head | None) -> Head | None:
-    """Return the trail's head if it is beyond the known one, else None.
-
-    Args:
-        known: as last saved.
-    """
-    found = connection.execute(
-        select(audit.c.seq, audit.c.hash)
-        .where(audit.c.seq > (known.seq if known else 0))
-        .order_by(audit.c.seq.desc())
-        .limit(1)
-    ).one_or_none()
+    """Return the trail's head if it is beyond the one last saved, else None."""
+    found = connection.execute(_NEWER, {"known": known.seq if known else 0}).one_or_none()
     return None if found is None else Head(found.seq, found.hash)
 
 
 def last_row(connection: Connection) -> AuditRow | None:
     """Return the trail's last row; None if it is empty."""
-    found = connection.execute(select(audit).order_by(audit.c.seq.desc()).limit(1)).one_or_none()
+    found = connection.execute(_LAST).one_or_none()
     return None if found is None else row_of(found)
 
 
 def row_of(found: Row[Any]) -> AuditRow:
-    """Make a row from the table's columns.
-
-    Args:
-        found: with all columns.
-    """
+    """Make a row from all of the table's columns."""
     return AuditRow(**found._asdict())
 
 
@@ -208,7 +185,7 @@ def _append(connection: Connection, entry: AuditEntry, last: AuditRow | None, se
         hash="",
     )
     row = replace(row, hash=row.true_hash)
-    connection.execute(insert(audit).values(asdict(row)))
+    connection.execute(insert(audit), asdict(row))
     return row
 
 

@@ -85,7 +85,7 @@ def check_audit(
     notes: list[str] = []
     number, before, hashes = 0, None, dict[int, str]()
     wanted = {anchor.seq for anchor in anchors} | ({saved.seq} if saved else set())
-    for row in _rows(connection, since):
+    for row in map(row_of, connection.execute(select(audit).where(audit.c.seq >= since).order_by(audit.c.seq))):
         number += 1
         if before is not None and (gap := _restored(row, before)):
             notes.append(gap)
@@ -124,11 +124,6 @@ def _signatures(saved: Head | None, anchors: Iterable[Head], keys: PublicKeys) -
     for anchor in anchors:
         if anchor.signature and not anchor.is_signed(keys):
             yield f"row {anchor.seq}: the anchor is not signed by the station's key: it was changed, or is of another"
-
-
-def _rows(connection: Connection, since: int) -> Iterator[AuditRow]:
-    for found in connection.execute(select(audit).where(audit.c.seq >= since).order_by(audit.c.seq)):
-        yield row_of(found)
 
 
 def _unsigned(row: AuditRow) -> Iterator[str]:

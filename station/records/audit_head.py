@@ -73,10 +73,7 @@ def signed_head(folder: Path, head: Head) -> Head:
 
 
 def save_head(folder: Path, head: Head) -> None:
-    """Sign the head and make it durable; it replaces the older of the two lines.
-
-    Args:
-        head: of a durable row.
+    """Sign the head of a durable row and make it durable; it replaces the older of the two lines.
 
     Raises:
         OSError: it may not be durable.
@@ -100,11 +97,7 @@ def save_head(folder: Path, head: Head) -> None:
 
 
 def try_save_head(folder: Path, head: Head) -> None:
-    """Save the head; a failure is logged only, because the trail itself is durable without it.
-
-    Args:
-        head: of a durable row.
-    """
+    """Save the head of a durable row; a failure is logged only, because the trail itself is durable without it."""
     try:
         save_head(folder, head)
     except (OSError, RecordsError) as error:

@@ -92,7 +92,6 @@ def read_manifest(directory: Path, keys: PublicKeys | None) -> Manifest:
     """Read a backup's manifest, and check that a station signed it.
 
     Args:
-        directory: as `make_backup` made it.
         keys: of which one has to have signed it; None for a backup that is used without a signature.
 
     Raises:
@@ -149,13 +148,7 @@ def _read(path: Path, most_bytes: int) -> bytes:
 
 
 def copy_image(source: Path, target: Path, sha256: str, size_bytes: int) -> int:
-    """Copy an image, durably, if its content matches its name.
-
-    Args:
-        size_bytes: as recorded; no more is read.
-
-    Returns:
-        Its size in bytes.
+    """Copy an image, durably, if its content matches its name; return its size in bytes, of which no more is read.
 
     Raises:
         FileNotFoundError: it is missing.

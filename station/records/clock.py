@@ -5,14 +5,10 @@ from datetime import UTC, datetime
 
 
 def utc_ms() -> int:
-    """Return the machine's clock, ms since 1970."""
+    """Return the machine's clock, ms since 1970-01-01 UTC; for records, never for waits."""
     return time.time_ns() // 1_000_000
 
 
 def formatted(utc_ms: int) -> str:
-    """Return a time for a terminal.
-
-    Args:
-        utc_ms: ms since 1970.
-    """
+    """Return a time, ms since 1970, for a terminal."""
     return datetime.fromtimestamp(utc_ms / 1000, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")

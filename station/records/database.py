@@ -66,10 +66,7 @@ def open_engine(path: Path, mode: Literal["ro", "rw", "rwc"]) -> Engine:
 
 
 def check(path: Path, within_s: float = CHECK_S) -> None:
-    """Check for damage; of a database that takes longer only the first part is checked.
-
-    Args:
-        path: the database, which exists.
+    """Check an existing database for damage; of one that takes longer only the first part is checked.
 
     Raises:
         DamagedError: it is damaged.
@@ -85,20 +82,11 @@ def check(path: Path, within_s: float = CHECK_S) -> None:
             return
         raise map_error(error, str(path)) from error
     if found != "ok":
-        raise map_error(_corrupt(found), str(path))
-
-
-def _corrupt(found: str) -> sqlite3.DatabaseError:
-    error = sqlite3.DatabaseError(found)
-    error.sqlite_errorcode = sqlite3.SQLITE_CORRUPT
-    return error
+        raise DamagedError(messages.DAMAGED(place=str(path), words=found), messages.OPEN_AGAIN())
 
 
 def move_aside(folder: Path, *names: str) -> Path:
-    """Move a damaged database, and the files that belong to it, out of the way.
-
-    Args:
-        names: files and folders in it; missing ones are skipped.
+    """Move a damaged database, and the files and folders that belong to it, out of the way; missing ones are skipped.
 
     Returns:
         The new folder, named with date and time.
@@ -120,10 +108,7 @@ def stamp() -> str:
 
 
 def migrate(engine: Engine, folder: Path) -> None:
-    """Migrate the schema to the newest version, after a copy of the database was made.
-
-    Args:
-        folder: contains the folder `backups`.
+    """Migrate the schema to the newest version, after a copy of the database was made in the folder's `backups`.
 
     Raises:
         SchemaError: it is a newer program's, or a migration failed; then it is unchanged.
@@ -223,11 +208,7 @@ def reading(folder: Path) -> Iterator[Connection]:
 
 
 def plain(connection: Connection) -> sqlite3.Connection:
-    """Return the driver's own connection, for what SQLAlchemy does not offer, or does too slowly.
-
-    Args:
-        connection: of an engine of `open_engine`.
-    """
+    """Return the connection of sqlite3 itself, for what SQLAlchemy does not offer, or does too slowly."""
     driver = connection.connection.driver_connection
     if not isinstance(driver, sqlite3.Connection):
         raise TypeError(f"{driver} is no connection of sqlite3")

@@ -54,12 +54,7 @@ _SYSTEM: dict[int, Mapped] = {
 
 
 def map_error(error: Exception, place: str) -> RecordsError:
-    """Convert what a write or read raised to a `RecordsError`.
-
-    Args:
-        error: from SQLAlchemy, sqlite3 or the operating system.
-        place: the file.
-    """
+    """Convert what SQLAlchemy, sqlite3 or the operating system raised for a file to a `RecordsError`."""
     if isinstance(error, RecordsError):
         return error
     said = error.orig if isinstance(error, DBAPIError) and error.orig is not None else error

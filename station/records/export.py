@@ -90,13 +90,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def export(folder: Path, query: Query, target: Path) -> int:
-    """Write the inspections that match a query, in order of number; the file appears when it is complete.
-
-    Args:
-        target: with one of `SUFFIXES`; replaced.
-
-    Returns:
-        The number of inspections.
+    """Write the inspections that match a query to a file with one of `SUFFIXES`, in order of number; return how many.
 
     Raises:
         RecordsError: the records cannot be read, or the file not written; then `target` is unchanged.

@@ -14,11 +14,7 @@ _FLAGS = {flag.value for flag in Flag}
 
 
 def first_press_measures(earlier: Sequence[Press]) -> dict[str, int | str]:
-    """Return the measurements of an inconclusive press for the record; nothing if there was none.
-
-    Args:
-        earlier: the presses before the last one.
-    """
+    """Return the record's measurements of an inconclusive press before the last one; nothing if there was none."""
     if not earlier:
         return {}
     first = earlier[0]
@@ -43,11 +39,7 @@ def first_press(measures: Mapping[str, Any]) -> Press | None:
 
 
 def first_press_findings(verdict: Judgement | None) -> Message | None:
-    """Return why the first press did not decide.
-
-    Args:
-        verdict: on it; None if the fruit was pressed once.
-    """
+    """Return why the first press did not decide, by the verdict on it; None if the fruit was pressed once."""
     found = [finding.message for finding in verdict.findings] if verdict is not None else []
     return joined(found) if found else None
 

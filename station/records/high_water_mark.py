@@ -20,10 +20,7 @@ class HighWaterMark:
     """Mark file of one folder. Not safe for use by two threads."""
 
     def __init__(self, path: Path) -> None:
-        """Read the file.
-
-        Args:
-            path: made by the first `save`.
+        """Read the file, which the first `save` makes.
 
         Raises:
             OSError: it exists and cannot be read.

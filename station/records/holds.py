@@ -1,11 +1,10 @@
 """Holds: images that the quota does not remove until a person releases them."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from sqlalchemy import ColumnElement, Connection, exists, insert, or_, select, update
+from sqlalchemy import ColumnElement, Connection, Table, exists, insert, or_, select, update
 
 from station.messages import records as messages
-from station.messages.message import Message
 from station.records.clock import utc_ms
 from station.records.errors import RecordsError
 from station.records.schema import holds, inspections
@@ -28,10 +27,7 @@ class Hold(NamedTuple):
 
 
 def hold(connection: Connection, thing: int | str, reason: str, by: str) -> Hold:
-    """Hold the images of an inspection or a lot. Idempotent: the first reason remains.
-
-    Args:
-        thing: the inspection's sequence, or the lot's name.
+    """Hold the images of an inspection, by its sequence, or a lot, by its name. Idempotent: the first reason remains.
 
     Raises:
         RecordsError: there is no such inspection or lot, or no reason is given.
@@ -40,22 +36,17 @@ def hold(connection: Connection, thing: int | str, reason: str, by: str) -> Hold
     active = _active(connection, thing)
     if active is not None:
         return active
-    table = inspections.c
-    condition = table.sequence == thing if isinstance(thing, int) else table.lot == thing
-    if connection.scalar(select(table.sequence).where(condition).limit(1)) is None:
-        raise RecordsError(_unknown(thing), messages.LIST_SHOWS())
-    connection.execute(insert(holds).values(**_key(thing), reason=reason, by=by, placed_utc_ms=utc_ms()))
-    held = _active(connection, thing)
-    if held is None:
-        raise RuntimeError("a hold was inserted and is not there")
+    if connection.scalar(select(inspections.c.sequence).where(_is(thing, inspections)).limit(1)) is None:
+        unknown = messages.NO_INSPECTION(number=thing) if isinstance(thing, int) else messages.NO_LOT(lot=repr(thing))
+        raise RecordsError(unknown, messages.LIST_SHOWS())
+    sequence, lot = (thing, None) if isinstance(thing, int) else (None, thing)
+    held = Hold(sequence, lot, reason, by, utc_ms())
+    connection.execute(insert(holds).values(held._asdict()))
     return held
 
 
 def release(connection: Connection, thing: int | str, reason: str, by: str) -> Hold:
-    """Release images for the quota; the hold itself remains in the history.
-
-    Args:
-        thing: as held.
+    """Release images, as held, for the quota; the hold itself remains in the history.
 
     Raises:
         RecordsError: it is not held, or no reason is given.
@@ -63,7 +54,9 @@ def release(connection: Connection, thing: int | str, reason: str, by: str) -> H
     _given(reason)
     active = _active(connection, thing)
     if active is None:
-        raise RecordsError(_not_held(thing), messages.HOLDS_SHOW())
+        if isinstance(thing, int):
+            raise RecordsError(messages.INSPECTION_NOT_HELD(number=thing), messages.HOLDS_SHOW())
+        raise RecordsError(messages.LOT_NOT_HELD(lot=repr(thing)), messages.HOLDS_SHOW())
     connection.execute(
         update(holds)
         .where(_is(thing), holds.c.released_utc_ms.is_(None))
@@ -89,27 +82,13 @@ def is_held() -> ColumnElement[bool]:
 _COLUMNS = (holds.c.sequence, holds.c.lot, holds.c.reason, holds.c.by, holds.c.placed_utc_ms)
 
 
-def _key(thing: int | str) -> dict[str, Any]:
-    return {"sequence": thing} if isinstance(thing, int) else {"lot": thing}
-
-
-def _is(thing: int | str) -> ColumnElement[bool]:
-    return holds.c.sequence == thing if isinstance(thing, int) else holds.c.lot == thing
+def _is(thing: int | str, table: Table = holds) -> ColumnElement[bool]:
+    return table.c.sequence == thing if isinstance(thing, int) else table.c.lot == thing
 
 
 def _active(connection: Connection, thing: int | str) -> Hold | None:
     row = connection.execute(select(*_COLUMNS).where(_is(thing), holds.c.released_utc_ms.is_(None))).one_or_none()
     return None if row is None else Hold(*row)
-
-
-def _unknown(thing: int | str) -> Message:
-    return messages.NO_INSPECTION(number=thing) if isinstance(thing, int) else messages.NO_LOT(lot=repr(thing))
-
-
-def _not_held(thing: int | str) -> Message:
-    if isinstance(thing, int):
-        return messages.INSPECTION_NOT_HELD(number=thing)
-    return messages.LOT_NOT_HELD(lot=repr(thing))
 
 
 def _given(reason: str) -> None:

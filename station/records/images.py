@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import cv2
 
 from station.atomic_file import PARTIAL, write_atomically
+from station.errors import StationError
 from station.messages import records as messages
-from station.messages.message import Message
 from station.records.error_mapping import map_error
 from station.records.errors import RecordsError
 from station.records.model import Image
@@ -43,33 +43,17 @@ class _Set(NamedTuple):
     images: tuple[Image, ...]
 
 
-class _NotStoredError(Exception):
-    """An inspection's images are not stored.
-
-    Attributes:
-        message: the reason.
-    """
-
-    def __init__(self, message: Message) -> None:
-        super().__init__(str(message))
-        self.message = message
+class _NotStoredError(StationError):
+    """An inspection's images are not stored, for the reason in its message."""
 
 
 def image_path(folder: Path, sha256: str) -> Path:
-    """Return the path of an image.
-
-    Args:
-        sha256: of the file's bytes.
-    """
+    """Return the path of the image whose bytes have this SHA-256."""
     return folder / FOLDER_NAME / sha256[:2] / f"{sha256}.png"
 
 
 def accepted_is_stored(sequence: int, share: float) -> bool:
-    """Check whether the images of an accepted fruit are stored: evenly spread, and the same answer every time.
-
-    Args:
-        share: 0 to 1.
-    """
+    """Check whether an accepted fruit's images are stored: a share, 0 to 1, evenly spread, and always the same ones."""
     return math.floor(sequence * share) > math.floor((sequence - 1) * share)
 
 
@@ -77,12 +61,7 @@ class ImageStore:
     """Background writer of images; images that cannot be written are dropped and reported."""
 
     def __init__(self, folder: Path, settings: RecordsSettings, submit: Callable[[Work[Any]], Future[Any]]) -> None:
-        """Start the thread; it first reconciles files and rows.
-
-        Args:
-            settings: quota, reserve and queue.
-            submit: of the writer.
-        """
+        """Start the thread, which submits to the writer; it first reconciles files and rows."""
         self.results: Counter[str] = Counter()
         self.size_bytes = 0
         self._folder = folder
@@ -142,7 +121,6 @@ class ImageStore:
             encoded = [_encoded(image) for image in work.images]
             self._make_space(sum(len(content) for content in encoded), accepted=work.accepted)
             for image, content in zip(work.images, encoded, strict=True):
-                self._go_on()
                 sha256 = hashlib.sha256(content).hexdigest()
                 self._write(image_path(self._folder, sha256), content)
                 rows.append({"kind": image.kind, "step": image.step, "sha256": sha256, "size_bytes": len(content)})
@@ -164,12 +142,10 @@ class ImageStore:
             return
         self.results.update({"kept": len(rows)} if rows else {})
 
-    def _go_on(self) -> None:
-        if self._stopping.is_set():
-            raise _NotStoredError(messages.STATION_ENDED())
-
     def _write(self, path: Path, content: bytes) -> None:
         """Write one durable file; nothing is done if it exists already."""
+        if self._stopping.is_set():
+            raise _NotStoredError(messages.STATION_ENDED())
         if path.exists():
             return
         path.parent.mkdir(parents=True, exist_ok=True)

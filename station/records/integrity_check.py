@@ -30,9 +30,6 @@ class IntegrityReport(NamedTuple):
 def check_records(folder: Path, proof: Proof = NO_PROOF) -> IntegrityReport:
     """Check everything, also while the station writes; changes nothing.
 
-    Args:
-        proof: what the person who checks knows from elsewhere of the audit trail.
-
     Raises:
         RecordsError: there are no records, or they cannot be read at all.
         BadInputError: the folder's public key is damaged.

@@ -11,11 +11,7 @@ _LIMITS = "limit_factor"
 
 
 def judgement_measures(verdict: Judgement) -> dict[str, float]:
-    """Return what the record stores of a verdict beside its reasons: relative standard uncertainties.
-
-    Args:
-        verdict: of a press that touched something; nothing is stored if its last threshold was not reached.
-    """
+    """Return a verdict's relative standard uncertainties for the record; none if the last threshold was not reached."""
     if verdict.summary is None:
         return {}
     shares = {_SHARE + each.name: round(each.relative, 5) for each in verdict.budget.components}
@@ -35,11 +31,7 @@ def is_judgement(measure: str) -> bool:
 
 
 def budget_rows(measures: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
-    """Return the budget's relative standard uncertainties: each component, combined, and the guard band.
-
-    Args:
-        measures: an inspection's; one without a budget gives no rows.
-    """
+    """Return the relative standard uncertainties of a budget, if any: each component, combined, and the guard band."""
     if _COMBINED not in measures or _FACTOR not in measures:
         return
     for name, text in COMPONENTS.items():

@@ -2,7 +2,6 @@
 
 from datetime import UTC, datetime
 from importlib.metadata import version
-from pathlib import Path
 
 import cv2
 
@@ -18,25 +17,8 @@ _PICTURE_PX = 320
 _JPEG_QUALITY = 82
 
 
-def write_report(lot: LotSummary, station: str, target: Path) -> None:
-    """Write a report.
-
-    Args:
-        station: its name.
-        target: replaced.
-
-    Raises:
-        OSError: it cannot be written.
-    """
-    target.write_text(html_report(lot, station), encoding="utf-8")
-
-
 def html_report(lot: LotSummary, station: str) -> str:
-    """Make an HTML document that needs no network and no other file.
-
-    Args:
-        station: its name; on each printed page beside the lot's.
-    """
+    """Make an HTML document that needs no network and no other file; each printed page names station and lot."""
     environment = templates("station.records")
     environment.filters["time"] = _time
     environment.filters["css"] = _css

@@ -85,10 +85,7 @@ class LotSummary:
 
 
 def summarise(folder: Path, name: str) -> LotSummary:
-    """Read a lot.
-
-    Args:
-        name: as the PLC gave it.
+    """Read a lot, by the name that the PLC gave it.
 
     Raises:
         RecordsError: no inspection has it, or the records cannot be read.
@@ -101,12 +98,8 @@ def summarise(folder: Path, name: str) -> LotSummary:
         first, last, began, ended = ask(ends, (name,)).fetchone()
         if first is None:
             raise RecordsError(messages.LOT_WITHOUT_INSPECTIONS(lot=repr(name)), messages.LIST_SHOWS_LOTS())
-        outcomes: Counter[str] = Counter({"PASS": 0, "FAIL": 0, "NO_RESULT": 0})
-        outcomes.update(
-            dict(
-                ask("SELECT outcome, count(*) FROM inspections WHERE lot = ? AND outcome NOT NULL GROUP BY 1", (name,))
-            )
-        )
+        ended_so = "SELECT outcome, count(*) FROM inspections WHERE lot = ? AND outcome NOT NULL GROUP BY 1"
+        outcomes = {"PASS": 0, "FAIL": 0, "NO_RESULT": 0, **dict(ask(ended_so, (name,)))}
         width = max(1, (last - first) // _SLICES + 1)
         slices = [[0, 0, 0] for _ in range((last - first) // width + 1)]
         counted = "SELECT (sequence - ?) / ?, outcome, count(*) FROM inspections WHERE lot = ? GROUP BY 1, 2"
@@ -140,7 +133,7 @@ def summarise(folder: Path, name: str) -> LotSummary:
             ended_utc_ms=ended,
             first=first,
             last=last,
-            outcomes=dict(outcomes),
+            outcomes=outcomes,
             reasons=tuple((why, str(reason_message(why)), number) for why, number in reasons),
             recipes=tuple(recipes),
             slices=tuple((ok, bad, none) for ok, bad, none in slices),

@@ -14,10 +14,9 @@ LONGEST_NAME = 32
 
 
 def start_lot(connection: Connection, name: str, grower: str, *, correct: bool = False) -> LotView:
-    """Register a lot's start. Idempotent.
+    """Register a lot's start, by the name that the PLC gives with each trigger. Idempotent.
 
     Args:
-        name: as the PLC gives it with each trigger.
         correct: replace the grower registered before.
 
     Raises:
@@ -56,12 +55,7 @@ def end_lot(connection: Connection, name: str) -> LotView:
 
 
 def read_lots(connection: Connection, limit: int, grower: str | None = None, name: str | None = None) -> list[LotView]:
-    """Read the registered lots, newest first.
-
-    Args:
-        grower: all growers by default.
-        name: only the lot of this name.
-    """
+    """Read the registered lots, or those of one grower or name, newest first."""
     query = select(*_COLUMNS).order_by(lots.c.id.desc()).limit(limit)
     for column, wanted in ((lots.c.grower, grower), (lots.c.name, name)):
         if wanted is not None:

@@ -23,10 +23,7 @@ class Marked(NamedTuple):
 
 
 def place_mark(connection: Connection, sequence: int, mark: Mark | None, by: str) -> Marked | None:
-    """Mark a fruit, or remove its mark. Idempotent: the same mark again leaves the first one, with its author.
-
-    Args:
-        mark: None removes it.
+    """Mark a fruit, or remove its mark by None. Idempotent: the same mark again leaves the first one, with its author.
 
     Returns:
         The mark before; None if there was none.

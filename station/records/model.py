@@ -31,12 +31,7 @@ class RecipeSnapshot:
 
     @classmethod
     def of(cls, values: Mapping[str, Any], revision: str = "") -> "RecipeSnapshot":
-        """Make a snapshot of a recipe's values, as `Recipe.model_dump(mode="json")` gives them.
-
-        Args:
-            values: with `name` and `plc_number`.
-            revision: the recipe's revision, if it has one.
-        """
+        """Make a snapshot of a recipe's values, as `Recipe.model_dump(mode="json")` gives them, and its revision."""
         text = json.dumps(values, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
         return cls(values["name"], values["plc_number"], revision, text)
 

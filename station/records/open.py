@@ -59,10 +59,7 @@ class Opened:
 
 
 def lock_folder(folder: Path) -> int:
-    """Make the folder if it is missing, and lock it against other stations.
-
-    Returns:
-        A descriptor; closing it releases the lock.
+    """Make the folder if it is missing, and lock it against other stations; closing the descriptor releases the lock.
 
     Raises:
         LockedError: another station has it.
@@ -90,10 +87,7 @@ def lock_folder(folder: Path) -> int:
 
 
 def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
-    """Open the records; the folder is locked by the caller. Blocks.
-
-    Args:
-        boot: name of this start of the station.
+    """Open the records for this start of the station, `boot`; the folder is locked by the caller. Blocks.
 
     Raises:
         RecordsError: they cannot be opened.
@@ -215,10 +209,7 @@ def _first_transaction(
 
 
 def set_mark(folder: Path, number: int) -> None:
-    """Set the high-water mark of sequence numbers, while no station has the folder.
-
-    Args:
-        number: the highest that was ever given.
+    """Set the high-water mark to the highest sequence number ever given, while no station has the folder.
 
     Raises:
         SequenceError: a higher one was given.

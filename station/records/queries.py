@@ -76,10 +76,7 @@ def read_alarm_log(connection: Connection, limit: int) -> tuple[AlarmEntry, ...]
 
 
 def read_inspection(connection: Connection, sequence: int, folder: Path) -> FullRecord:
-    """Read all stored data of one inspection.
-
-    Args:
-        folder: the records' folder, for the images' paths.
+    """Read all stored data of one inspection; the records' folder is that of the images' paths.
 
     Raises:
         UnknownInspectionError: there is no record of it.
@@ -122,11 +119,7 @@ SELECT sequence, area_mm2 FROM curve_points WHERE sequence IN (SELECT value FROM
 
 
 def read_summaries(connection: Connection, sequences: Sequence[int]) -> list[Summary]:
-    """Read some inspections for a list, highest number first.
-
-    Args:
-        sequences: missing ones are left out.
-    """
+    """Read some inspections for a list, highest number first; missing ones are left out."""
     database = plain(connection)  # through SQLAlchemy a page takes several times as long
     wanted = (json.dumps(list(sequences)),)
     areas: defaultdict[int, list[float | None]] = defaultdict(list)

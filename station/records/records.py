@@ -251,10 +251,7 @@ class Records:
         """Store that the PLC was given an outcome; it overrides the judgement. The first one remains: idempotent.
 
         An inspection that this database does not know, as one begun before a damaged database was moved aside, is
-        recorded from the outcome itself.
-
-        Returns:
-            Whether it is the first time, so that it is counted once.
+        recorded from the outcome itself. True for the first time, so that it is counted once.
 
         Raises:
             UnknownInspectionError: no such sequence was ever given.
@@ -264,10 +261,7 @@ class Records:
         return await self._ask(lambda connection: publish(connection, outcome, mark.value, self._boot))
 
     async def acknowledged(self, sequence: int) -> int:
-        """Store that the PLC has taken every published outcome up to this sequence. Idempotent.
-
-        Returns:
-            The number of newly acknowledged outcomes.
+        """Store that the PLC has taken every outcome up to this sequence, and count the new ones. Idempotent.
 
         Raises:
             RecordsError: it may not be durable.
@@ -308,10 +302,7 @@ class Records:
         return await self._ask(lambda connection: tuple(append_audit(connection, entry) for entry in entries))
 
     async def change(self, work: Work[T]) -> T:
-        """Carry out a change of lots or holds, as `lambda connection: start_lot(connection, name, grower)`.
-
-        Args:
-            work: runs in the writer's thread and transaction.
+        """Change lots or holds in the writer's thread, as `lambda connection: start_lot(connection, name, grower)`.
 
         Raises:
             RecordsError: it may not be durable.

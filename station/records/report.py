@@ -135,10 +135,8 @@ def _judged(judged: InspectionRecord) -> Iterator[str]:
     others = {
         name: value for name, value in judged.measures.items() if not (is_judgement(name) or is_first_press(name))
     }
-    for title, values in (("measures", others), ("phases, s", judged.phases_s)):
-        if values:
-            yield _field(title, _pairs(values))
-    for title, values in (("devices", judged.devices), ("versions", judged.versions)):
+    last = {"measures": others, "phases, s": judged.phases_s, "devices": judged.devices, "versions": judged.versions}
+    for title, values in last.items():
         if values:
             yield _field(title, _pairs(values))
 

@@ -45,9 +45,6 @@ def restore_backup(folder: Path, directory: Path, by: str, keys: PublicKeys | No
     them, the database last. After an interruption call it again.
 
     Args:
-        folder: the records' folder; no station has it open.
-        directory: as `make_backup` made it.
-        by: name of the person, for the audit trail.
         keys: of stations, of which one has to have signed the backup; None for a backup without a known signature.
 
     Raises:

@@ -13,9 +13,6 @@ def remove_oldest_images(connection: Connection, *, for_accepted: bool) -> tuple
 
     An accepted fruit's images never displace a rejected one's, and what is on hold stays.
 
-    Args:
-        for_accepted: whether the space is for an accepted fruit's images.
-
     Returns:
         The freed bytes and the names of the files that no row refers to any more; None if none may go.
     """
@@ -52,11 +49,7 @@ def referred(connection: Connection) -> dict[str, int]:
 
 
 def forget_missing(connection: Connection, missing: frozenset[str]) -> None:
-    """Mark every inspection whose files are missing as lost; the events store the files' names.
-
-    Args:
-        missing: the files' names.
-    """
+    """Mark every inspection whose files, by their names, are missing as lost; the events store the names."""
     columns = images.c
     rows = connection.execute(select(columns.id, columns.sequence, columns.sha256).order_by(columns.sequence))
     lost: dict[int, dict[int, str]] = {}

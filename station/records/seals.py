@@ -54,23 +54,13 @@ _HAS_PART = {
 
 
 def seal(connection: Connection, sequence: int, *parts: str) -> None:
-    """Append a row with the hashes of an inspection's parts as the database has them now.
-
-    Args:
-        connection: in the transaction that stores them.
-        parts: of `record`, `outcome` and `images`.
-    """
+    """Append, in the transaction that stores them, the hashes of an inspection's `record`, `outcome` or `images`."""
     hashes = {part: part_hash(plain(connection), sequence, part) for part in parts}
     append_audit(connection, AuditEntry(STATION, STATION, SEALED, f"inspection {sequence}", new=hashes))
 
 
 def begin_seals(connection: Connection, highest: int, public_key: str) -> None:
-    """Append, at a start, a row that the seals begin, or that the station's key is another one now.
-
-    Args:
-        highest: the highest number given.
-        public_key: hexadecimal.
-    """
+    """Append, at a start, that the seals begin after the highest number given, or that the key is another one now."""
     found = _rows(plain(connection), BEGAN)
     if not found or found[-1]["public_key"] != public_key:
         new = {"after": highest, "public_key": public_key}

@@ -58,11 +58,7 @@ class Page(NamedTuple):
 
 
 def find_page(connection: Connection, query: Query, limit: int = 50, below: int | None = None) -> Page:
-    """Return one page of a result.
-
-    Args:
-        limit: at most so many, up to `LARGEST_PAGE`.
-        below: of the page before; None for the first page.
+    """Return one page of a result, up to `LARGEST_PAGE`; `below` is of the page before, None for the first page.
 
     Raises:
         RecordsError: the limit is invalid.
@@ -75,12 +71,7 @@ def find_page(connection: Connection, query: Query, limit: int = 50, below: int 
 
 
 def find(connection: Connection, query: Query, highest: int = LARGEST) -> Iterator[int]:
-    """Yield the matching numbers, highest first, in the database's present state.
-
-    Args:
-        connection: in use until the last number was taken.
-        highest: none above this one.
-    """
+    """Yield the matching numbers, highest first; the connection is in use until the last number was taken."""
     database = plain(connection)
     lists = _lists(database, query)
     timed = query.from_utc_ms is not None or query.to_utc_ms is not None
@@ -114,7 +105,8 @@ def _lists(database: sqlite3.Connection, query: Query) -> list[Seek]:
     if query.grower is not None:
         lists.append(_of_grower(database, query.grower, query.outcome))
     if query.lot is not None:
-        lists.append(_of_lot(database, query.lot, query.outcome))
+        chosen = [query.outcome] if query.outcome else []
+        lists.append(_seek(database, _lot_statement("?", query.outcome), query.lot, *chosen))
     elif query.outcome is not None and not lists:
         lists.append(
             _seek(
@@ -155,10 +147,6 @@ def _with_reason(database: sqlite3.Connection, reason: Reason, outcome: OutcomeN
         return max((found for each in seeks if (found := each(highest)) is not None), default=None)
 
     return seek
-
-
-def _of_lot(database: sqlite3.Connection, lot: str, outcome: OutcomeName | None) -> Seek:
-    return _seek(database, _lot_statement("?", outcome), lot, *([outcome] if outcome else []))
 
 
 def _lot_statement(lot: str, outcome: OutcomeName | None) -> str:

@@ -4,6 +4,7 @@ The key never leaves the records' folder: neither a backup nor an export contain
 """
 
 import contextlib
+import functools
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,13 +27,7 @@ _LONGEST_FILE_BYTES = 10_000
 
 
 def sign(folder: Path, content: bytes) -> bytes:
-    """Sign with the folder's key; a missing key is made first.
-
-    Args:
-        folder: the records' folder.
-
-    Returns:
-        64 bytes.
+    """Return a signature of 64 bytes with the key of the records' folder; a missing key is made first.
 
     Raises:
         OSError: the key cannot be read or made.
@@ -57,10 +52,7 @@ def own_public_key(folder: Path) -> Ed25519PublicKey:
 
 
 def read_public_key(path: Path) -> Ed25519PublicKey:
-    """Read a public key.
-
-    Args:
-        path: a PEM file, as `public_key.pem` in the records' folder of a station.
+    """Read a public key, a PEM file as `public_key.pem` in the records' folder of a station.
 
     Raises:
         BadInputError: it cannot be read, or contains no public Ed25519 key.
@@ -105,13 +97,20 @@ def _key(folder: Path) -> Ed25519PrivateKey:
     path = folder / KEY_NAME
     if not path.exists():
         _make(path)
-    try:
-        key = serialization.load_pem_private_key(path.read_bytes(), password=None)
-    except (ValueError, TypeError, UnsupportedAlgorithm):
-        key = None
-    if not isinstance(key, Ed25519PrivateKey):
+    key = _parsed(path.read_bytes())
+    if key is None:
         raise RecordsError(messages.NO_SIGNING_KEY(path=str(path)), messages.REPLACE_KEY())
     return key
+
+
+@functools.lru_cache(maxsize=1)
+def _parsed(pem: bytes) -> Ed25519PrivateKey | None:
+    """Return the key of a file's content; kept, because parsing takes longer than signing does."""
+    try:
+        key = serialization.load_pem_private_key(pem, password=None)
+    except (ValueError, TypeError, UnsupportedAlgorithm):
+        return None
+    return key if isinstance(key, Ed25519PrivateKey) else None
 
 
 def _make(path: Path) -> None:

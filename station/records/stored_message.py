@@ -3,8 +3,6 @@
 import json
 from typing import Any
 
-from pydantic import ValidationError
-
 from station.messages import records as messages
 from station.messages.message import Message, message_in, verbatim
 
@@ -33,15 +31,7 @@ def to_stored(message: Message) -> dict[str, Any]:
 
 
 def from_stored(stored: Any) -> Message:
-    """Return the message of a stored value; a sentence, and what is no message, as it is.
-
-    Args:
-        stored: as JSON gave it.
-    """
+    """Return the message of a stored JSON value; a sentence, and what is no message, as it is."""
     if isinstance(stored, str):
         return verbatim(stored)
-    text = json.dumps(stored, ensure_ascii=False)
-    try:
-        return Message.model_validate_json(text)
-    except ValidationError:
-        return verbatim(text)
+    return message_in(json.dumps(stored, ensure_ascii=False)) or verbatim("")

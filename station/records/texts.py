@@ -8,11 +8,7 @@ _BARS = "▁▂▃▄▅▆▇█"
 
 
 def sparkline(values: Sequence[float | None]) -> str:
-    """Draw a curve in one line of bars, from 0 to its largest value; a dot for a missing value.
-
-    Args:
-        values: as areas in mm², in the order of the steps.
-    """
+    """Draw a curve, as areas by step, in one line of bars, from 0 to its largest value; a dot for a missing value."""
     largest = max((value for value in values if value is not None), default=0.0)
     return "".join("·" if value is None else _bar(value, largest) for value in values)
 

@@ -1,11 +1,11 @@
 """Write requests of the records, each a function of the writer's connection."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from typing import Any, Literal
 
 from pydantic import ValidationError
-from sqlalchemy import Connection, delete, insert, select, update
+from sqlalchemy import Connection, bindparam, delete, insert, select, update
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from station.channel.line import Outcome, Reason
@@ -13,7 +13,7 @@ from station.messages import records as messages
 from station.messages.message import Message, text_of
 from station.records.clock import utc_ms
 from station.records.errors import BadRecordError, UnknownInspectionError
-from station.records.model import AlarmEntry, AlarmRow, InspectionRecord, Trigger
+from station.records.model import AlarmEntry, AlarmRow, CurvePoint, InspectionRecord, Trigger
 from station.records.schema import (
     alarms,
     alarms_log,
@@ -43,6 +43,9 @@ _BEGUN = (
     "size_class",
 )
 """What is known of an inspection when it begins: columns of its row and fields of its outcome."""
+_UPDATE = update(inspections).where(inspections.c.sequence == bindparam("number"))
+"""Sets the columns that are given. SQLAlchemy makes a statement anew for values that are part of it."""
+_POINT = tuple(field.name for field in fields(CurvePoint))
 _PENDING = (text_of(messages.IMAGES_PENDING()), "pending")  # the second: of versions before messages
 
 
@@ -55,7 +58,7 @@ def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot
     recipe = trigger.recipe
     if recipe is not None:
         snapshot = {**asdict(recipe), "sha256": recipe.sha256, "checksum": recipe.checksum}
-        connection.execute(upsert(recipe_snapshots).values(snapshot).on_conflict_do_nothing())
+        connection.execute(insert(recipe_snapshots).prefix_with("OR IGNORE"), snapshot)
     begun = {
         **asdict(replace(trigger, recipe=None)),
         "sequence": sequence,
@@ -66,7 +69,7 @@ def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot
     _lost(begun)
     note_skipped(connection, sequence)
     sha256 = recipe.sha256 if recipe else None
-    connection.execute(insert(inspections).values(**begun, boot=boot, recipe_sha256=sha256, images_state=""))
+    connection.execute(insert(inspections), {**begun, "boot": boot, "recipe_sha256": sha256, "images_state": ""})
     index_hour(connection, sequence, trigger.began_utc_ms)
 
 
@@ -103,33 +106,33 @@ def conclude(
     passed = record.outcome == standing.outcome == "PASS"
     images_state = images_states["PASS" if passed else "other"]
     connection.execute(
-        update(inspections)
-        .where(inspections.c.sequence == sequence)
-        .values(
-            judged=record.outcome,
-            reasons=[str(reason) for reason in record.reasons],
-            explanation=[to_stored(message) for message in record.explanation],
-            late=record.late,
-            partial=record.partial,
-            area_mm2=judged.area_mm2,
-            area_px=judged.area_px,
-            closing_mm=judged.closing_mm,
-            confidence=judged.confidence,
-            ended_utc_ms=record.ended_utc_ms,
-            duration_ms=record.duration_ms,
-            phases_s=dict(record.phases_s),
-            measures={**record.measures, **_messages(record)},
-            devices=dict(record.devices),
-            versions=dict(record.versions),
-            images_state=text_of(images_state),
-            outcome=standing.outcome,
-            standing=standing.model_dump_json(),
-        )
+        _UPDATE,
+        {
+            "number": sequence,
+            "judged": record.outcome,
+            "reasons": [str(reason) for reason in record.reasons],
+            "explanation": [to_stored(message) for message in record.explanation],
+            "late": record.late,
+            "partial": record.partial,
+            "area_mm2": judged.area_mm2,
+            "area_px": judged.area_px,
+            "closing_mm": judged.closing_mm,
+            "confidence": judged.confidence,
+            "ended_utc_ms": record.ended_utc_ms,
+            "duration_ms": record.duration_ms,
+            "phases_s": dict(record.phases_s),
+            "measures": {**record.measures, **_messages(record)},
+            "devices": dict(record.devices),
+            "versions": dict(record.versions),
+            "images_state": text_of(images_state),
+            "outcome": standing.outcome,
+            "standing": standing.model_dump_json(),
+        },
     )
     if row.standing is None:
         index_reasons(connection, None, standing)
     if record.curve:
-        points = [{**asdict(point), "flags": list(point.flags), "sequence": sequence} for point in record.curve]
+        points = [{name: getattr(point, name) for name in _POINT} | {"sequence": sequence} for point in record.curve]
         connection.execute(insert(curve_points), points)
     seal(connection, sequence, "record", "outcome")
     if row.published_utc_ms is not None:
@@ -155,11 +158,8 @@ def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: st
         if outcome.sequence > given_up_to:
             raise UnknownInspectionError(messages.NEVER_BEGUN(number=outcome.sequence), messages.ASK_OPEN())
         _insert_published(connection, outcome, boot)
-    connection.execute(
-        update(inspections)
-        .where(inspections.c.sequence == outcome.sequence)
-        .values(outcome=outcome.outcome, standing=outcome.model_dump_json(), published_utc_ms=utc_ms())
-    )
+    published = {"outcome": outcome.outcome, "standing": outcome.model_dump_json(), "published_utc_ms": utc_ms()}
+    connection.execute(_UPDATE, {"number": outcome.sequence, **published})
     stood = None if found is None or found.standing is None else Outcome.model_validate_json(found.standing)
     index_reasons(connection, stood, outcome)
     if stood != outcome:
@@ -169,13 +169,8 @@ def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: st
 
 
 def queue_event(connection: Connection, kind: OutboxKind, row: int) -> None:
-    """Queue a row for other systems: an inspection when it is published, and again when it changes after that.
-
-    Args:
-        connection: the writer's, in the transaction of the change.
-        row: its sequence, id or number.
-    """
-    connection.execute(insert(outbox).values(kind=kind, row=row))
+    """Queue a row's sequence, id or number for other systems: an inspection when published, and when it changes."""
+    connection.execute(insert(outbox), {"kind": kind, "row": row})
 
 
 def acknowledge(connection: Connection, sequence: int) -> int:
@@ -189,11 +184,7 @@ def acknowledge(connection: Connection, sequence: int) -> int:
 
 
 def end_open_inspections(connection: Connection) -> list[int]:
-    """End, after a start, what was not surely delivered: NO_RESULT with `station_lost`.
-
-    Returns:
-        The sequences.
-    """
+    """End, after a start, what was not surely delivered: NO_RESULT with `station_lost`; returns the sequences."""
     table = inspections.c
     rows = connection.execute(
         select(inspections).where(table.acknowledged_utc_ms.is_(None), table.published_utc_ms.is_(None))
@@ -237,7 +228,7 @@ def add_counts(connection: Connection, by: Mapping[str, int]) -> dict[str, int]:
 def add_event(connection: Connection, name: str, sequence: int | None, details: Mapping[str, Any]) -> None:
     """Append an event."""
     values = {"utc_ms": utc_ms(), "name": name, "sequence": sequence, "details": dict(details)}
-    connection.execute(insert(events).values(values))
+    connection.execute(insert(events), values)
 
 
 def add_images(connection: Connection, sequence: int, rows: Sequence[Mapping[str, Any]], state: Message) -> None:

@@ -29,7 +29,7 @@ Work = Callable[[Connection], T]
 """Part of the transaction, run in the writer's thread. It may raise a `RecordsError`."""
 
 LARGEST_BATCH = 128
-CONCERNING_ALL = (DamagedError, DiskError, DiskFullError, LockedError, ReadOnlyError)
+CONCERNING_ALL = (DiskFullError, ReadOnlyError, DiskError, LockedError, DamagedError)
 """Faults of the disk or the file, which roll back the whole transaction."""
 
 
@@ -76,12 +76,9 @@ class Writer:
         return self._queue.qsize()
 
     def submit(self, work: Work[T]) -> Future[T]:
-        """Queue a request; cancelling the future withdraws it if it has not started.
+        """Queue a request to run in the thread; cancelling the future withdraws it if it has not started.
 
         A request that an answer submits, in the thread, is still carried out after `close`.
-
-        Args:
-            work: runs in the thread.
 
         Returns:
             Its result once it is durable, or a `RecordsError`.
@@ -151,16 +148,18 @@ class Writer:
 
     def _attempt(self, connection: Connection, work: Work[Any]) -> Any:
         """Return the request's result, or the error for which it alone was rolled back; raise errors of the whole."""
-        savepoint = connection.begin_nested()
+        # By the driver: SQLAlchemy compiles each of its own savepoints anew.
+        connection.exec_driver_sql("SAVEPOINT request")
         try:
             result = work(connection)
         except Exception as error:
             told = map_error(error, self._place)
             if isinstance(told, CONCERNING_ALL):
                 raise told from error  # SQLite may have undone all of it already, the savepoint too
-            savepoint.rollback()
+            connection.exec_driver_sql("ROLLBACK TO request")
+            connection.exec_driver_sql("RELEASE request")
             return told
-        savepoint.commit()
+        connection.exec_driver_sql("RELEASE request")
         return result
 
     def _disconnect(self) -> None:

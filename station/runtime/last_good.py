@@ -23,7 +23,6 @@ def load_or_last_good(file: Path | None, environ: Mapping[str, str] | None = Non
 
     Args:
         file: the file that the user named; None: found as `load_configuration` does.
-        environ: the environment; the process's own by default.
 
     Returns:
         The configuration, and the error in its files; empty for none.

@@ -15,11 +15,7 @@ class StateFiles:
         self.folder = folder
 
     def read(self, name: str) -> bytes | None:
-        """Return a file's content; None if it is missing or cannot be read.
-
-        Args:
-            name: relative to the folder.
-        """
+        """Return the content of a file in the folder; None if it is missing or cannot be read."""
         try:
             return (self.folder / name).read_bytes()
         except FileNotFoundError:
@@ -29,15 +25,7 @@ class StateFiles:
             return None
 
     def write(self, name: str, data: bytes) -> bool:
-        """Replace a file atomically.
-
-        Args:
-            name: relative to the folder.
-            data: nothing is written if the file has this content already.
-
-        Returns:
-            Whether the file has this content now.
-        """
+        """Replace a file in the folder atomically, unless it has this content; return whether it has it now."""
         path = self.folder / name
         if self.read(name) == data:
             return True

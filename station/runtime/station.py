@@ -54,12 +54,7 @@ _USUAL_DEADLINE_S = 30.0
 
 
 class Station:
-    """One start of the station.
-
-    Args:
-        configuration: the site's, or its last good form.
-        broken: the error of the configuration's files; empty for none.
-    """
+    """One start of the station, by the site's configuration, or its last good form and the error of its files."""
 
     def __init__(self, configuration: Configuration, broken: str = "") -> None:
         self.boot = uuid.uuid4().hex

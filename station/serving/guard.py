@@ -115,7 +115,6 @@ class GuardedListener(socket.socket):
     """Listening socket that admits connections within limits; what it hands out has a place.
 
     Args:
-        family: of `socket`.
         known: returns whether an address may use the reserve.
     """
 

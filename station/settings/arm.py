@@ -87,12 +87,7 @@ class Centring(Settings):
         return self
 
     def in_tool_mm(self, right_mm: float, down_mm: float) -> tuple[float, float, float]:
-        """A way in the image as a way along the tool's x, y and z.
-
-        Args:
-            right_mm: to the right in the image.
-            down_mm: down in the image.
-        """
+        """A way to the right and down in the image as a way along the tool's x, y and z."""
         way = dict.fromkeys("xyz", 0.0)
         for (sign, axis), distance_mm in ((self.image_right, right_mm), (self.image_down, down_mm)):
             way[axis] = -distance_mm if sign == "-" else distance_mm

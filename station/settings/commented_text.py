@@ -39,13 +39,7 @@ class CommentedText:
             raise SettingsError([Problem(messages.PATH(path=source), messages.FILE(), expected)]) from error
 
     def comment(self, values: Any, key: str, text: str) -> None:
-        """Put a comment behind a value, in the place of the one there; comments on lines of their own stay.
-
-        Args:
-            values: the mapping that holds it.
-            key: the value's there.
-            text: one line, without its sign.
-        """
+        """Put a one-line comment behind a mapping's value, in place of the one there; comments on own lines stay."""
         tokens = values.ca.items.get(key)
         if tokens is None or tokens[2] is None:
             values.yaml_add_eol_comment(text, key)

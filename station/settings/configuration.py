@@ -24,8 +24,8 @@ from station.settings.network import Host, Port
 from station.settings.outbox import OutboxSettings
 from station.settings.paths import Folder
 from station.settings.plc import HandshakeSettings
-from station.settings.problems import FieldError, Problem, SettingsError, dotted, field_name, shortened
 from station.settings.problems import Path as Where
+from station.settings.problems import Problem, SettingsError, dotted, field_name, shortened
 from station.settings.records import RecordsSettings
 from station.settings.schema import branches, leaves, schema_of
 from station.settings.service import ServiceSettings
@@ -109,20 +109,14 @@ class Configuration(Settings):
             for other in servers
             if other != name and servers[other] == address
         ]
-        if clashes:
-            raise FieldError(clashes)
-        return self
+        return self.accepted(*clashes)
 
 
 def load_configuration(file: Path | None = None, environ: Mapping[str, str] | None = None) -> Configuration:
-    """Read the configuration: defaults, overridden by the file, overridden by the environment.
+    """Read the configuration: defaults, overridden by the file, overridden by the environment (`environ`).
 
     The file is the one given; else the one that `STATION_CONFIG` names; else `station.yaml` in the home folder
     (`STATION_HOME`, or the default) where there is one. Every path in the result is absolute.
-
-    Args:
-        file: the file that the user named.
-        environ: the environment; the process's own by default.
 
     Raises:
         SettingsError: all problems of the environment and of the file.
@@ -134,10 +128,6 @@ def load_configuration(file: Path | None = None, environ: Mapping[str, str] | No
 
 def check_configuration(content: bytes, file: Path) -> Configuration:
     """Read a configuration as `load_configuration` would, if the file had this content.
-
-    Args:
-        content: of the file.
-        file: whose folder relative paths start from.
 
     Raises:
         SettingsError: all problems of the environment and of the content.
@@ -165,11 +155,7 @@ def _loaded(document: Document, chosen: Path | None, environ: Mapping[str, str])
 
 
 def configuration_file(file: Path | None = None, environ: Mapping[str, str] | None = None) -> Path | None:
-    """Return the file that `load_configuration` reads, or None for none.
-
-    Args:
-        file: the file that the user named.
-        environ: the environment; the process's own by default.
+    """Return the file that `load_configuration` reads, or None for none; the arguments are the same.
 
     Raises:
         SettingsError: the environment names none.

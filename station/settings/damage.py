@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field, model_validator
 from station.messages import settings as messages
 from station.messages.message import Message
 from station.settings.model import Settings, setting
-from station.settings.problems import FieldError, Path
+from station.settings.problems import Path
 
 LARGEST_AREA_MM2 = 260.0
 """No area can be larger: the whole field, 640x480 px, at the coarsest scale published for a DIGIT, 0.0291 mm/px."""
@@ -40,10 +40,7 @@ class AreaThreshold(Settings):
 
     @model_validator(mode="after")
     def _leaves_room(self) -> Self:
-        if self.least_area_mm2 >= self.area_mm2:
-            expected = messages.LESS_THAN(field="area_mm2", limit=self.area_mm2, unit=" mm²", value=self.least_area_mm2)
-            raise FieldError([(("least_area_mm2",), expected)])
-        return self
+        return self.in_order("least_area_mm2", "area_mm2", " mm²")
 
 
 class LengthRange(Settings):
@@ -59,10 +56,7 @@ class LengthRange(Settings):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        if self.smallest_mm >= self.largest_mm:
-            expected = messages.LESS_THAN(field="largest_mm", limit=self.largest_mm, unit=" mm", value=self.smallest_mm)
-            raise FieldError([(("smallest_mm",), expected)])
-        return self
+        return self.in_order("smallest_mm", "largest_mm", " mm")
 
 
 class RatioRange(Settings):
@@ -73,10 +67,7 @@ class RatioRange(Settings):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        if self.smallest >= self.largest:
-            expected = messages.LESS_THAN(field="largest", limit=self.largest, unit="", value=self.smallest)
-            raise FieldError([(("smallest",), expected)])
-        return self
+        return self.in_order("smallest", "largest", "")
 
 
 class SizeClass(LengthRange):
@@ -162,9 +153,7 @@ class SizeOfFruit(Settings):
             if after.number <= before.number:
                 rising = messages.CLASS_NOT_RISING(before=before.number, value=after.number)
                 wrong.append((("classes", index, "number"), rising))
-        if wrong:
-            raise FieldError(wrong)
-        return self
+        return self.accepted(*wrong)
 
 
 class Repeatability(Settings):
@@ -216,9 +205,7 @@ class AreaUncertainty(Settings):
             if after.closing_mm <= before.closing_mm:
                 expected = messages.CLOSING_NOT_RISING(value=after.closing_mm)
                 wrong.append((("repeatability", index, "closing_mm"), expected))
-        if wrong:
-            raise FieldError(wrong)
-        return self
+        return self.accepted(*wrong)
 
 
 AREA_UNCERTAINTY = AreaUncertainty()
@@ -281,6 +268,4 @@ class DamageThresholds(Settings):
                 wrong.append((("area", index, "closing_mm"), expected))
             if after.area_mm2 < before.area_mm2:
                 wrong.append((("area", index, "area_mm2"), messages.THRESHOLD_FALLING(value=after.area_mm2)))
-        if wrong:
-            raise FieldError(wrong)
-        return self
+        return self.accepted(*wrong)

@@ -18,21 +18,12 @@ PLACE = messages.ENVIRONMENT()
 
 
 def variable(path: Path) -> str:
-    """Return the variable of a field: its path's names in capitals, joined by `_`.
-
-    Args:
-        path: `("modbus", "port")` gives `STATION_MODBUS_PORT`.
-    """
+    """Return a field's variable: its path's names in capitals, joined by `_`, as `STATION_MODBUS_PORT`."""
     return PREFIX + "_".join(str(part) for part in path).upper()
 
 
 def named(path: Path, given: Iterable[Path]) -> str | None:
-    """Return a field's variable, with the path inside its value, if the environment sets it; else None.
-
-    Args:
-        path: a field, or a place inside a field's list or mapping.
-        given: the fields that the environment gives.
-    """
+    """Return the variable, with the path inside its value, of a given field or a place inside one; else None."""
     for field in given:
         if path[: len(field)] == field:
             inside = path[len(field) :]
@@ -45,10 +36,7 @@ def named(path: Path, given: Iterable[Path]) -> str | None:
 
 
 def variables(root: Node) -> dict[str, Leaf]:
-    """Return every variable with the field that it sets.
-
-    Args:
-        root: the configuration's schema.
+    """Return every variable with the field of the configuration's schema that it sets.
 
     Raises:
         ValueError: two fields would have one variable; one of them needs another name.
@@ -63,12 +51,7 @@ def variables(root: Node) -> dict[str, Leaf]:
 
 
 def overrides(root: Node, environ: Mapping[str, str]) -> tuple[dict[Path, Any], list[Problem]]:
-    """Return the environment's values by their fields; and its unknown variables and invalid texts.
-
-    Args:
-        root: the configuration's schema.
-        environ: all environment variables; those without the prefix are ignored.
-    """
+    """Return the environment's values by their fields; and its unknown variables with the prefix, and invalid texts."""
     known = variables(root)
     problems: list[Problem] = []
     values: dict[Path, Any] = {}

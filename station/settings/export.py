@@ -10,6 +10,7 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from station.settings.configuration import Configuration
+from station.settings.problems import dotted
 from station.settings.recipe import APPROVED_NAME, approved_list
 from station.settings.recipe_model import Recipe
 from station.settings.schema import Leaf, Node, expectation, leaves, resolved, schema_of
@@ -19,11 +20,7 @@ BEGIN, END = "<!-- fields: made by python -m station.settings.export -->\n", "<!
 
 
 def exported(root: Path = ROOT) -> dict[Path, str]:
-    """Return the content of each file.
-
-    Args:
-        root: the checkout; of the recipe guide the text around the table is retained.
-    """
+    """Return the content of each file of the checkout; the recipe guide's text around the table is retained."""
     recipe_guide = root / "docs" / "recipes.md"
     return {
         root / "recipes" / "recipe.schema.json": json_schema(Recipe, "A recipe of the fruit-inspection station"),
@@ -43,8 +40,9 @@ def json_schema(model: type[BaseModel], title: str) -> str:
 def recipe_table() -> str:
     """The recipe's fields as a Markdown table."""
     root = schema_of(Recipe)
-    rows = [_row([f"`{_dotted(leaf)}`", *_columns(leaf, root)]) for leaf in leaves(root, into_lists=True)]
-    return "".join([_head("field", "takes", "default", "meaning"), *rows])
+    head = [["field", "takes", "default", "meaning"], ["---"] * 4]
+    rows = ([f"`{dotted(leaf.path)}`", *_columns(leaf, root)] for leaf in leaves(root, into_lists=True))
+    return "".join(_row(cells) for cells in (*head, *rows))
 
 
 def example() -> str:
@@ -77,23 +75,9 @@ def _section(node: Node, root: Node, depth: int) -> Iterator[str]:
 def _columns(leaf: Leaf, root: Node) -> list[str]:
     """Return a field's accepted values, default and meaning."""
     default = f"`{json.dumps(leaf.node['default'], ensure_ascii=False)}`" if "default" in leaf.node else "required"
-    takes = "a list of the following" if _of_mappings(leaf, root) else str(expectation(leaf.node, root))
+    of_mappings = "properties" in resolved(leaf.node.get("items") or {}, root)
+    takes = "a list of the following" if of_mappings else str(expectation(leaf.node, root))
     return [takes, default, leaf.node.get("description", "")]
-
-
-def _of_mappings(leaf: Leaf, root: Node) -> bool:
-    """Return whether a field is a list of mappings."""
-    return "properties" in resolved(leaf.node.get("items") or {}, root)
-
-
-def _dotted(leaf: Leaf) -> str:
-    """A field's path with dots."""
-    return ".".join(str(part) for part in leaf.path)
-
-
-def _head(*names: str) -> str:
-    """Return a table's first two rows."""
-    return _row(list(names)) + _row(["---"] * len(names))
 
 
 def _row(cells: list[str]) -> str:

@@ -11,10 +11,7 @@ LARGEST_FILE_BYTES = 64 * 1024
 
 
 def read_content(path: Path) -> bytes:
-    """Read the bytes of a file.
-
-    Args:
-        path: a regular file of at most `LARGEST_FILE_BYTES`, UTF-8, with or without a byte order mark.
+    """Read the bytes of a regular file of at most `LARGEST_FILE_BYTES`, UTF-8 with or without a byte order mark.
 
     Raises:
         SettingsError: it cannot be read.

@@ -27,11 +27,7 @@ class Migrated(NamedTuple):
 
 
 def migrated(content: bytes, source: str) -> Migrated:
-    """Move the settings of an earlier version to their new places. Idempotent.
-
-    Args:
-        content: the file's; `load_configuration` validates its values.
-        source: the file's name for messages.
+    """Move the settings of an earlier version to their new places; the values are not validated. Idempotent.
 
     Raises:
         SettingsError: it is no YAML mapping, or a setting is in its old and in its new place.

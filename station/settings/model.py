@@ -1,8 +1,12 @@
 """The base of every settings model: strict, frozen, and explained field by field."""
 
-from typing import Any
+from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field
+
+from station.messages import settings as messages
+from station.messages.message import Message
+from station.settings.problems import FieldError, Path
 
 
 class Settings(BaseModel):
@@ -15,6 +19,18 @@ class Settings(BaseModel):
         allow_inf_nan=False,
         validate_default=True,
     )
+
+    def accepted(self, *wrong: tuple[Path, Message]) -> Self:
+        """Return the model, or raise `FieldError` for the wrong values inside it."""
+        if wrong:
+            raise FieldError(wrong)
+        return self
+
+    def in_order(self, lower: str, upper: str, unit: str) -> Self:
+        """Return the model, or raise `FieldError` where the lower of two fields is not less than the upper."""
+        value, limit = getattr(self, lower), getattr(self, upper)
+        expected = messages.LESS_THAN(field=upper, limit=limit, unit=unit, value=value)
+        return self if value < limit else self.accepted(((lower,), expected))
 
 
 def setting(

@@ -3,6 +3,7 @@
 The table and the drawing of docs/network.md, and the rules of an example site; a test compares them.
 """
 
+import textwrap
 from html import escape
 from pathlib import Path
 
@@ -43,11 +44,7 @@ def example_site() -> Configuration:
 
 
 def exported(root: Path = ROOT) -> dict[Path, str]:
-    """Return the content of each file.
-
-    Args:
-        root: the checkout; of its document the text around the table is retained.
-    """
+    """Return the content of each file of the checkout; the document's text around the table is retained."""
     guide = root / "docs" / "network.md"
     before, _, rest = guide.read_text(encoding="utf-8").partition(BEGIN)
     return {
@@ -94,7 +91,7 @@ def drawing(listed: tuple[Conduit, ...]) -> str:
 
 
 def _box(zone: Zone, x: float, y: float, height: float, *, thick: bool = False) -> str:
-    lines = _wrapped(MEANING[zone])
+    lines = textwrap.wrap(MEANING[zone], 37, break_on_hyphens=False)
     middle = x + _BOX_WIDTH / 2
     return "".join(
         [
@@ -124,15 +121,6 @@ def _arrows(zone: Zone, x: float, y: float, listed: list[Conduit]) -> str:
             drawn += _text((start + end) / 2, line_y + 15 + 15 * number, name, 11, "middle")
         line_y += 15 * len(group) + 24
     return drawn
-
-
-def _wrapped(text: str, longest: int = 36) -> list[str]:
-    lines = [""]
-    for word in text.split():
-        if len(lines[-1]) + len(word) > longest:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
-    return lines
 
 
 def _text(x: float, y: float, text: str, size: int, anchor: str) -> str:

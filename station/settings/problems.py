@@ -24,11 +24,7 @@ def field_name(path: Path) -> Message:
 
 
 def shortened(text: str, longest: int = 60) -> str:
-    """Return a text that fits a message's line, with everything unprintable escaped.
-
-    Args:
-        longest: maximum number of characters.
-    """
+    """Return a text of at most `longest` characters for a message's line, with everything unprintable escaped."""
     if len(text) > longest:
         text = text[: longest - 1] + "…"
     return text if text.isprintable() else text.encode("unicode_escape").decode()

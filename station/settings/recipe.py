@@ -40,10 +40,7 @@ def load_recipe(path: Path) -> Recipe:
 
 
 def load_recipes(folder: Path | None = None) -> dict[str, Recipe]:
-    """Read all recipes of a folder, by name.
-
-    Args:
-        folder: the folder; the recipes shipped with the station by default.
+    """Read all recipes of a folder, of those shipped with the station by default, by name.
 
     Raises:
         SettingsError: all problems of all files; the folder cannot be read or holds no recipe; two files hold the
@@ -84,10 +81,7 @@ def find_recipe(name_or_path: str | Path, folder: Path | None = None) -> Recipe:
 
 
 def recipe_files(folder: Path | None = None) -> list[Path]:
-    """Return the recipe files of a folder, sorted by name.
-
-    Args:
-        folder: the folder; the recipes shipped with the station by default.
+    """Return the recipe files of a folder, of the shipped recipes by default, sorted by name.
 
     Raises:
         SettingsError: the folder cannot be read or holds no recipe.
@@ -122,11 +116,7 @@ def approved_by_distribution() -> dict[str, str]:
 
 
 def approved_list(folder: Path | None = None) -> str:
-    """Return the content of that list.
-
-    Args:
-        folder: of the recipes; those shipped by default.
-    """
+    """Return the content of that list for the recipes of a folder, the shipped ones by default."""
     hashes = {recipe.name: content_sha256(recipe) for recipe in load_recipes(folder).values()}
     return json.dumps(hashes, indent=2, sort_keys=True) + "\n"
 

@@ -8,7 +8,7 @@ from station.messages import settings as messages
 from station.messages.message import Message
 from station.settings.damage import LARGEST_AREA_MM2, DamageThresholds
 from station.settings.model import Settings, setting
-from station.settings.problems import FieldError, Path, WantedError
+from station.settings.problems import Path, WantedError
 from station.settings.segmentation import Segmentation
 
 
@@ -37,10 +37,7 @@ class WidthRange(Settings):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        if self.smallest_mm >= self.largest_mm:
-            expected = messages.LESS_THAN(field="largest_mm", limit=self.largest_mm, unit=" mm", value=self.smallest_mm)
-            raise FieldError([(("smallest_mm",), expected)])
-        return self
+        return self.in_order("smallest_mm", "largest_mm", " mm")
 
 
 class WidthSteps(Settings):
@@ -125,9 +122,7 @@ class WidthSteps(Settings):
                 wrong.append((place, messages.BEYOND_STEPS(travel_mm=self.travel_mm, value=closing_mm)))
             elif index and closing_mm <= self.result_closings_mm[index - 1]:
                 wrong.append((place, messages.CLOSING_NOT_RISING(value=closing_mm)))
-        if wrong:
-            raise FieldError(wrong)
-        return self
+        return self.accepted(*wrong)
 
 
 class Grip(Settings):
@@ -274,6 +269,4 @@ class Recipe(Settings):
         if self.early_stop.growth_mm2_per_mm < self.damage.growth_mm2_per_mm:
             limit, given = self.damage.growth_mm2_per_mm, self.early_stop.growth_mm2_per_mm
             wrong.append((("early_stop", "growth_mm2_per_mm"), messages.STOP_BELOW_GROWTH(limit=limit, value=given)))
-        if wrong:
-            raise FieldError(wrong)
-        return self
+        return self.accepted(*wrong)

@@ -40,11 +40,7 @@ def with_values(
 
 
 def upgraded_text(text: str, source: str) -> tuple[str, int] | None:
-    """Migrate a text of an earlier schema version.
-
-    Args:
-        text: YAML.
-        source: the text's name for messages.
+    """Migrate a recipe's YAML text of an earlier schema version.
 
     Returns:
         The new text, a valid recipe's, and its earlier schema version; None if it has the present one.

@@ -22,11 +22,7 @@ text's values with their comments, in place; `schema_version` is raised by the c
 
 
 def parse_recipe(text: str, source: str) -> Recipe:
-    """Parse a recipe.
-
-    Args:
-        text: YAML of this or an earlier schema version.
-        source: the text's name for messages.
+    """Parse a recipe from YAML of this or an earlier schema version.
 
     Raises:
         SettingsError: all problems of the recipe.
@@ -35,10 +31,7 @@ def parse_recipe(text: str, source: str) -> Recipe:
 
 
 def recipe_of(document: Document) -> Recipe:
-    """Validate a recipe.
-
-    Args:
-        document: a file's content, of this or an earlier schema version.
+    """Validate a recipe from a file's content, of this or an earlier schema version.
 
     Raises:
         SettingsError: all problems of the recipe.
@@ -74,12 +67,7 @@ def upgrade(values: MutableMapping[str, Any]) -> int | None:
 
 
 def rename(values: MutableMapping[str, Any], old: str, new: str) -> None:
-    """Rename a field in a migration: its place and, in a text, its comment are retained.
-
-    Args:
-        values: the mapping that has the field.
-        old: its name; a missing field is ignored.
-    """
+    """Rename a field, if it is there, in a migration: its place and, in a text, its comment are retained."""
     if old not in values:
         return
     comments = getattr(getattr(values, "ca", None), "items", {})  # ruamel's, by key

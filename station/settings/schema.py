@@ -29,11 +29,7 @@ def schema_of(model: type[BaseModel]) -> Node:
 
 
 def resolved(node: Node, root: Node) -> Node:
-    """Return a node with its reference resolved; keys beside the reference have precedence.
-
-    Args:
-        node: a part of `root`.
-    """
+    """Return a node of `root` with its reference resolved; keys beside the reference have precedence."""
     while "$ref" in node:
         target = root["$defs"][node["$ref"].rpartition("/")[2]]
         node = {**target, **{key: value for key, value in node.items() if key != "$ref"}}
@@ -41,11 +37,7 @@ def resolved(node: Node, root: Node) -> Node:
 
 
 def branches(node: Node, root: Node) -> list[Node]:
-    """Return a node's alternatives without `null`; the node itself if it has none.
-
-    Args:
-        node: a part of `root`.
-    """
+    """Return the alternatives of a node of `root` without `null`; the node itself if it has none."""
     node = resolved(node, root)
     several = [branch for key in ("anyOf", "oneOf") for branch in node.get(key, ())]
     flat = [each for branch in several for each in branches(branch, root) if each.get("type") != "null"]
@@ -54,11 +46,7 @@ def branches(node: Node, root: Node) -> list[Node]:
 
 
 def find(root: Node, path: Path) -> Node | None:
-    """Return the node of a field, or None if the schema has no such field.
-
-    Args:
-        path: keys and positions.
-    """
+    """Return the node of a field by keys and positions, or None if the schema has no such field."""
     found = [resolved(root, root)]
     for part in path:
         found = [child for node in found for branch in branches(node, root) for child in _children(branch, part)]
@@ -78,11 +66,7 @@ def _children(node: Node, part: str | int) -> list[Node]:
 
 
 def names(root: Node, path: Path) -> list[str]:
-    """Return the names of the fields inside a mapping.
-
-    Args:
-        path: of the mapping.
-    """
+    """Return the names of the fields inside the mapping at a path."""
     node = find(root, path)
     return [name for branch in branches(node, root) for name in branch.get("properties", ())] if node else []
 
@@ -218,11 +202,6 @@ def _length(low: int | None, high: int | None, things: _Counted) -> Message | No
     if low == high:
         return things.exactly(number=high)
     return things.between(least=low, most=high) if low else things.most(number=high)
-
-
-def figure(value: float) -> str:
-    """Format a number to six digits, without a needless `.0`."""
-    return str(int(value)) if value == int(value) else f"{value:.6g}"
 
 
 def found(value: Any) -> Message:

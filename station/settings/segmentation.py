@@ -6,7 +6,6 @@ from pydantic import model_validator
 
 from station.messages import settings as messages
 from station.settings.model import Settings, setting
-from station.settings.problems import FieldError
 
 
 class PaperParameters(Settings):
@@ -97,9 +96,7 @@ class PaperParameters(Settings):
             for name in ("template_window_px", "search_window_px", "kernel_px")
             if (side_px := getattr(self, name)) % 2 == 0
         ]
-        if even:
-            raise FieldError(even)
-        return self
+        return self.accepted(*even)
 
 
 class RobustParameters(Settings):

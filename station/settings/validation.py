@@ -23,12 +23,7 @@ Locate = Callable[[Where], tuple[Message, Message]]
 
 
 def validated(model: type[Model], document: Document, value: Any, locate: Locate) -> Model:
-    """Validate plain values.
-
-    Args:
-        document: the source file; its own problems come first.
-        value: mappings, lists, texts, numbers, truth values and None.
-        locate: returns the place of a value in the source.
+    """Validate plain values: mappings, lists, texts, numbers, truth values and None.
 
     Raises:
         SettingsError: all problems.

@@ -55,10 +55,7 @@ class Document:
 
 
 def read_document(path: Path) -> Document:
-    """Read a file.
-
-    Args:
-        path: as for `read_content`.
+    """Read a file, as `read_content`.
 
     Raises:
         SettingsError: the file cannot be read. Problems of its content are in the document's `problems`.
@@ -67,12 +64,7 @@ def read_document(path: Path) -> Document:
 
 
 def parse_document(content: bytes, source: str) -> Document:
-    """Parse a file's content; an empty one is None.
-
-    Args:
-        content: the bytes.
-        source: the file's name for messages.
-    """
+    """Parse a file's content, named by `source` in messages; an empty one is None."""
     try:
         reader = _Reader(content.decode("utf-8-sig"))
         node = reader.get_single_node()

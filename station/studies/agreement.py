@@ -46,13 +46,7 @@ class Agreement:
 
 
 def agreement(passed: Decisions, operators: Sequence[str], good: npt.NDArray[np.bool_] | None = None) -> Agreement:
-    """Compare decisions with each other, and with the truth if it is known.
-
-    Args:
-        passed: shape (parts, operators, repeats).
-        operators: their names.
-        good: the truth, shape (parts,); None if it is not known.
-    """
+    """Compare decisions, shape (parts, operators, repeats), and the truth, shape (parts,) or None, with each other."""
     rows = tuple(_operator(name, passed[:, place], good) for place, name in enumerate(operators))
     between = tuple(
         (operators[a], operators[b], cohen_kappa(passed[:, a].ravel(), passed[:, b].ravel()))

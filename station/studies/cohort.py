@@ -52,15 +52,10 @@ class Member:
 
 
 def member(kind: Kind | str, seed: int, number: int) -> Member:
-    """Draw one sample.
+    """Draw sample `number`, from 0, of a kind of `FRUITS` in the study of a seed.
 
     Weight, length and width are those of the paper's sample `number` modulo 30; stiffness, creep, skin, place,
     phase of the steps and the sensor's noise are drawn. The ball is always 24 mm and closed to the paper's widths.
-
-    Args:
-        kind: one of `FRUITS`.
-        seed: of the study.
-        number: of the sample, from 0.
 
     Raises:
         ValueError: there is no such kind in the studies.

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from station.analysis.stages import StagedMethod
+from station.charts.report import png
 from station.studies.cohort import member
 from station.studies.failure import image_at
 from station.studies.sample import SampleResult, segmentation_of
@@ -29,11 +30,7 @@ _DPI = 110
 def press_sheet(study: Study, number: int) -> bytes:
     """Draw one press's images: original, difference, denoised, and segmented with the true edge (cf. its Fig. 13).
 
-    Args:
-        number: of the sample, from 1.
-
-    Returns:
-        A JPEG.
+    The sample is counted from 1, and the picture is a JPEG.
     """
     request = study.request
     press = member(request.kind, request.seed, number - 1).press()
@@ -63,19 +60,13 @@ def press_sheet(study: Study, number: int) -> bytes:
             if not column:
                 axis.set_ylabel(name, fontsize=9)
         axes[0, column].set_title(f"{press.closings_mm[place]:.1f} mm", fontsize=9)
-    return _saved(figure, "jpeg")
+    data = BytesIO()
+    figure.savefig(data, format="jpeg", dpi=_DPI, pil_kwargs={"quality": 82})
+    return data.getvalue()
 
 
 def one_curve(studies: Sequence[Study], number: int) -> bytes:
-    """Plot area over closing of one sample with the truth (cf. its Fig. 14).
-
-    Args:
-        studies: one or two of the same cohort.
-        number: of the sample, from 1.
-
-    Returns:
-        A PNG.
-    """
+    """Plot area over closing of a sample, from 1, of one or two studies with the truth (cf. its Fig. 14); a PNG."""
     figure = Figure(figsize=(7.2, 3.6), layout="constrained")
     axis = figure.add_subplot()
     truth = studies[0].samples[number - 1]
@@ -86,18 +77,11 @@ def one_curve(studies: Sequence[Study], number: int) -> bytes:
         axis.plot(sample.closings_mm, _mm2(sample.areas_px), color=colour, marker=marker, markersize=4, label=name)
     _dress(axis, studies[0])
     axis.legend(frameon=False, loc="upper left")
-    return _saved(figure, "png")
+    return png(figure)
 
 
 def cohort_curves(studies: Sequence[Study]) -> bytes:
-    """Plot area over closing of all samples: those that did not fail, and those that did (cf. its Figs. 21 to 32).
-
-    Args:
-        studies: one or two of the same cohort; a row each.
-
-    Returns:
-        A PNG.
-    """
+    """Plot area over closing of the samples that did not fail, and did (cf. its Figs. 21 to 32), a row a study; PNG."""
     figure = Figure(figsize=(10.0, 3.3 * len(studies)), layout="constrained")
     axes = np.asarray(figure.subplots(len(studies), 2, squeeze=False, sharex=True, sharey=True))
     for row, study in zip(axes, studies, strict=True):
@@ -123,18 +107,11 @@ def cohort_curves(studies: Sequence[Study]) -> bytes:
         axis.set_xlabel("")
     for axis in axes[:, 1]:
         axis.set_ylabel("")
-    return _saved(figure, "png")
+    return png(figure)
 
 
 def areas_at_results(studies: Sequence[Study]) -> bytes:
-    """Plot measured over true area of every sample at the results' closings.
-
-    Args:
-        studies: one or two of the same cohort; a row each.
-
-    Returns:
-        A PNG.
-    """
+    """Plot measured over true area of every sample at the results' closings, a row for each study; a PNG."""
     closings = studies[0].result_closings_mm
     shown = [closings[0], closings[len(closings) // 2], closings[-1]]
     figure = Figure(figsize=(10.0, 3.4 * len(studies)), layout="constrained")
@@ -145,7 +122,7 @@ def areas_at_results(studies: Sequence[Study]) -> bytes:
         row[0].set_ylabel(f"{study.request.method}: measured [mm²]")
     for axis in axes[-1]:
         axis.set_xlabel("true area [mm²]")
-    return _saved(figure, "png")
+    return png(figure)
 
 
 def _scatter(axis: Axes, study: Study, closing_mm: float) -> None:
@@ -203,17 +180,7 @@ def _mm2(areas_px: Sequence[int]) -> npt.NDArray[np.float64]:
     return np.asarray(areas_px, float) * _MM2
 
 
-def _saved(figure: Figure, kind: str) -> bytes:
-    data = BytesIO()
-    figure.savefig(data, format=kind, dpi=_DPI, pil_kwargs={"quality": 82} if kind == "jpeg" else None)
-    return data.getvalue()
-
-
 def typical(study: Study, *, failed: bool) -> SampleResult | None:
-    """Return the sample of median width among those that failed, or did not; None if there is none.
-
-    Args:
-        failed: choose among the failed ones.
-    """
+    """Return the sample of median width among those that failed, or did not; None if there is none."""
     those = [s for s, causes in zip(study.samples, study.causes, strict=True) if bool(causes) == failed]
     return sorted(those, key=lambda sample: sample.width_mm)[len(those) // 2] if those else None

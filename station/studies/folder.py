@@ -50,10 +50,7 @@ class StudyFolder:
     """The folder `DIR` of `station study`."""
 
     def __init__(self, folder: Path, identity: Identity) -> None:
-        """Open or make the folder of a study.
-
-        Args:
-            folder: an empty or new one, or this study's own.
+        """Open or make the folder of a study: an empty or new one, or this study's own.
 
         Raises:
             BadInputError: it holds something else, is no folder, or cannot be written.
@@ -92,11 +89,7 @@ class StudyFolder:
             raise BadInputError(f"{self.folder}: holds another study ({words}); name a new folder with --out")
 
     def stored(self, number: int) -> SampleResult | None:
-        """Read a sample; None if it is missing or cannot be read: it is then measured again.
-
-        Args:
-            number: of the sample, from 1.
-        """
+        """Read a sample by its number, from 1; None if it is missing or cannot be read: it is then measured again."""
         try:
             found = SampleResult.model_validate_json(self._place(number).read_bytes())
         except (OSError, ValidationError):
@@ -112,10 +105,7 @@ class StudyFolder:
         self.write(f"samples/{self._place(sample.number).name}", sample.model_dump_json().encode())
 
     def write(self, name: str, data: bytes) -> None:
-        """Write a file atomically.
-
-        Args:
-            name: path below the folder.
+        """Write a file atomically at a path below the folder.
 
         Raises:
             StationError: as for `store`.

@@ -62,10 +62,7 @@ class Gauge:
     tolerance: float | None
 
     def component(self, name: str) -> Component:
-        """Return one component by its name.
-
-        Args:
-            name: EV, AV, INT, GRR, PV or TV.
+        """Return one component by its name: EV, AV, INT, GRR, PV or TV.
 
         Raises:
             KeyError: there is none of that name.

@@ -30,11 +30,7 @@ _CLOSINGS_MM = np.arange(0.5, 10.0, 0.5)
 
 
 def ball_of(task: GaugeTask, parts: int) -> Fruit:
-    """Return the ball; sizes are evenly spaced.
-
-    Args:
-        parts: number of balls, at least 2.
-    """
+    """Return the ball; the sizes of at least 2 are evenly spaced."""
     return _ball(SMALLEST_MM + (LARGEST_MM - SMALLEST_MM) * task.part / (parts - 1))
 
 
@@ -44,13 +40,10 @@ def _ball(across_mm: float) -> Fruit:
 
 @cache
 def stop_mm(fruit: str) -> float:
-    """Return the closing at the stop, mm: there the largest ball shows the recipe's last area limit.
+    """Return the closing at the stop, mm: there the largest ball shows the last area limit of the fruit's recipe.
 
     So the areas end at the decision. Beyond a strawberry's area, a smooth ball leaves no background on the gel, and the
     method flags more and more of them.
-
-    Args:
-        fruit: the recipe's name.
     """
     largest = _ball(LARGEST_MM)
     areas = [true_area_mm2(largest, Pose(), closing_mm) for closing_mm in _CLOSINGS_MM]
@@ -62,10 +55,6 @@ def measure_dummy(task: GaugeTask, parts: int) -> Simulated:
 
     A flagged measurement is no reading: the ball is laid in and pressed again, and the refusals are counted. The fifth
     is accepted in any case; a contact that was not found has 0 mm².
-
-    Args:
-        task: the ball, the operator and the repeat; its fruit names the recipe.
-        parts: number of balls.
 
     Returns:
         The measurement with the truth of `DUMMY_TRUTHS`.

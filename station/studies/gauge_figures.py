@@ -1,11 +1,10 @@
 """Plots of a gauge study, as in AIAG's MSA."""
 
-from io import BytesIO
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from station.charts.report import png
 from station.studies.gauge import SPREAD, Gauge
 from station.studies.gauge_table import Crossed
 
@@ -13,15 +12,10 @@ _COLOURS = ("#1f4e79", "#c9791b", "#2e7d5b", "#7b3f8c", "#8c6d1f", "#3f7f8c")
 _MARKERS = "os^Dvp"
 _D4 = {2: 3.267, 3: 2.574, 4: 2.282, 5: 2.114, 6: 2.004, 7: 1.924, 8: 1.864, 9: 1.816, 10: 1.777}
 """Upper limit of the mean range, by the number of repeats (AIAG's SPC, 2nd edition, appendix E)."""
-_DPI = 110
 
 
 def components_plot(gauge: Gauge) -> bytes:
-    """Plot bars of each kind of variation, against the total and the tolerance.
-
-    Returns:
-        A PNG.
-    """
+    """Plot bars of each kind of variation, against the total and the tolerance, as a PNG."""
     shown = [one for one in gauge.components if one.name != "TV"]
     figure = Figure(figsize=(10.0, 3.2), layout="constrained")
     axis = figure.add_subplot()
@@ -43,15 +37,11 @@ def components_plot(gauge: Gauge) -> bytes:
     axis.set_ylabel("%")
     axis.legend(frameon=False)
     _plain(axis)
-    return _png(figure)
+    return png(figure)
 
 
 def measurements_plot(table: Crossed) -> bytes:
-    """Plot every measurement by part, the operators' means by part, and the ranges of the repeats.
-
-    Returns:
-        A PNG.
-    """
+    """Plot every measurement by part, the operators' means by part, and the ranges of the repeats, as a PNG."""
     figure = Figure(figsize=(10.0, 7.4), layout="constrained")
     by_part, means, ranges = (figure.add_subplot(3, 1, row) for row in (1, 2, 3))
     values, places = table.areas_mm2, np.arange(len(table.parts))
@@ -89,16 +79,10 @@ def measurements_plot(table: Crossed) -> bytes:
         _plain(axis)
     ranges.set_xlabel("part")
     by_part.legend(frameon=False, ncols=operators, loc="upper left", bbox_to_anchor=(0, 1.32))
-    return _png(figure)
+    return png(figure)
 
 
 def _plain(axis: Axes) -> None:
     axis.grid(color="#e2e2de", linewidth=0.6, axis="y")
     axis.set_axisbelow(True)
     axis.spines[["top", "right"]].set_visible(False)
-
-
-def _png(figure: Figure) -> bytes:
-    data = BytesIO()
-    figure.savefig(data, format="png", dpi=_DPI)
-    return data.getvalue()

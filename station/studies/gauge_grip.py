@@ -34,21 +34,12 @@ GoesOn = Callable[[float, Contact], bool]
 
 
 def deciding_closing_mm(recipe: Recipe) -> float:
-    """The closing of the last damage threshold.
-
-    Args:
-        recipe: the fruit's.
-    """
+    """The closing of the recipe's last damage threshold."""
     return recipe.damage.area[-1].closing_mm
 
 
 def true_area_mm2(fruit: Fruit, pose: Pose, closing_mm: float) -> float:
-    """The true area at a true closing, held for a while: what a perfect gauge would say.
-
-    Args:
-        pose: how it lies.
-        closing_mm: from the true first contact.
-    """
+    """The true area at a closing from the true first contact, held for a while: what a perfect gauge would say."""
     gel = Gel()
     return FruitOnGel(fruit, pose, gel).pressed(Squeeze(fruit, gel, _HELD_S).at(closing_mm)).true_area_mm2
 
@@ -116,12 +107,7 @@ class FruitRig(StationaryRig):
         return self.images_at(self._width_mm, number)
 
     def images_at(self, width_mm: float, number: int) -> tuple[SimulatedFrame, ...]:
-        """Image so often at a true width, without any pause before.
-
-        Args:
-            width_mm: any, also between two counts.
-            number: of frames.
-        """
+        """Take so many frames at any true width, also between two counts, without a pause before."""
         closing_mm = self.fruit.width_mm - width_mm
         dent = None
         if closing_mm > 0:
@@ -140,12 +126,7 @@ class FruitRig(StationaryRig):
 
 
 class Grip:
-    """One fruit between gel and sponge, pressed by a recipe.
-
-    Args:
-        recipe: how many frames, and how they are measured; how to step, in a press.
-        rig: with the fruit.
-    """
+    """One fruit between gel and sponge, stepped and measured by a recipe."""
 
     def __init__(self, recipe: Recipe, rig: FruitRig) -> None:
         self._recipe, self._rig = recipe, rig
@@ -154,11 +135,7 @@ class Grip:
         self._measurement = PressMeasurement(self.method)
 
     def held(self, closing_mm: float) -> Contact:
-        """Measure one step by itself, at a width that something else than the gripper's counts decides.
-
-        Args:
-            closing_mm: the true one.
-        """
+        """Measure one step by itself, at a true closing that something else than the gripper's counts decides."""
         width_mm = self._rig.counts_from_mm = self._rig.fruit.width_mm - closing_mm
         return self._measurement.measure(asyncio.run(take_step(self._rig, self._recipe, 0, width_mm))).contact
 
@@ -188,14 +165,7 @@ class Grip:
         return Pressed(stopped or press, press, self._rig.fruit.width_mm - onset.width_mm)
 
     def approach(self, phase: float) -> Onset | None:
-        """Close count by count to the first contact.
-
-        Args:
-            phase: 0 to 1, where the fruit's width lies between two counts of the gripper.
-
-        Returns:
-            The onset; None where nothing was touched.
-        """
+        """Close count by count to the first contact, None without one; `phase` as for `press`."""
         count_mm = self._rig.finest_step_mm
         start_mm = self._rig.counts_from_mm = self._rig.fruit.width_mm + _APPROACH_MM + phase * count_mm
 
@@ -211,12 +181,7 @@ class Grip:
         return Onset(width_mm, count_mm if width_mm < start_mm else 0.0, found.start.contact)
 
     def close(self, onset: Onset, goes_on: GoesOn) -> None:
-        """Close step by step by the recipe, as one press.
-
-        Args:
-            onset: where the steps begin.
-            goes_on: gets the closing, in whole counts of the gripper, and the contact; first those of the onset.
-        """
+        """Close step by step by the recipe as one press; `goes_on` gets closings in whole counts, the onset's first."""
         count_mm = self._rig.finest_step_mm
         self._rig.counts_from_mm = onset.width_mm
         self._measurement.follow(onset.contact)

@@ -66,11 +66,7 @@ def render(study: GaugeStudy) -> str:
 
 
 def tolerance_percents(gauge: Gauge) -> list[float]:
-    """Return EV, AV, INT and GRR in per cent of the tolerance; 0 for a pooled interaction.
-
-    Args:
-        gauge: analysed with a tolerance.
-    """
+    """Return EV, AV, INT and GRR in per cent of the tolerance that it was analysed with; 0 for a pooled interaction."""
     found = {one.name: one.tolerance_percent or 0.0 for one in gauge.components}
     return [found.get(name, 0.0) for name in ("EV", "AV", "INT", "GRR")]
 

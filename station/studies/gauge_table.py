@@ -47,11 +47,7 @@ class Crossed(NamedTuple):
 
 
 def crossed(measurements: Sequence[Measurement], place: str) -> Crossed:
-    """Order measurements by part and operator.
-
-    Args:
-        measurements: in any order; repeats keep their order.
-        place: name of their source, for messages.
+    """Order measurements by part and operator; repeats keep their order. `place` names their source in messages.
 
     Raises:
         BadInputError: not every operator measured every part equally often, at least two of each; or a part has two
@@ -92,10 +88,7 @@ def crossed(measurements: Sequence[Measurement], place: str) -> Crossed:
 
 
 def read_measurements(path: Path) -> list[Measurement]:
-    """Read a file with the columns `part,operator,repeat,area_mm2` and, where known, `outcome` and `reference`.
-
-    Args:
-        path: of the CSV file, UTF-8, with a header.
+    """Read a UTF-8 file with the columns `part,operator,repeat,area_mm2` and, where known, `outcome` and `reference`.
 
     Raises:
         BadInputError: it cannot be read, or a line is invalid; the message names the line.
@@ -156,11 +149,7 @@ def _area(path: Path, line: int, text: str) -> float:
 
 
 def written(measurements: Sequence[Measurement]) -> bytes:
-    """Return the same file's content.
-
-    Args:
-        measurements: in the order of the rows.
-    """
+    """Return the same file's content, with a row for each in this order."""
     text = StringIO(newline="")
     table = csv.writer(text)
     table.writerow(COLUMNS)

@@ -126,10 +126,6 @@ def good_and_damaged_mm2(fruit: str, seed: int) -> tuple[float, float]:
     """Return true areas at the deciding closing, mean over the paper's 30 sizes: sound fruit, and the same bruised.
 
     Their difference is the tolerance.
-
-    Args:
-        fruit: the recipe's name.
-        seed: of the cohort.
     """
     closing_mm = deciding_closing_mm(find_recipe(fruit))
 

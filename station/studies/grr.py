@@ -43,12 +43,7 @@ class GaugeStudy:
 def analysed(
     title: str, facts: Sequence[tuple[str, str]], measurements: Sequence[Measurement], tolerance: float | None
 ) -> GaugeStudy:
-    """Analyse areas and outcomes.
-
-    Args:
-        title: of the report; also the source named in messages.
-        facts: names and values for the report.
-        tolerance: in mm²; None for no tolerance.
+    """Analyse areas and outcomes, with a tolerance in mm² or none; messages name the source by the title.
 
     Raises:
         BadInputError: the measurements do not make a complete table.
@@ -60,10 +55,7 @@ def analysed(
 
 
 def check_folder(out: Path) -> None:
-    """Check before the work that the results can be stored.
-
-    Args:
-        out: the folder for the results.
+    """Check before the work that the results can be stored in a folder.
 
     Raises:
         BadInputError: it is not empty, or it cannot be made.
@@ -79,10 +71,7 @@ def check_folder(out: Path) -> None:
 
 
 def store(study: GaugeStudy, page: str, out: Path) -> None:
-    """Write `measurements.csv`, `grr.json` and `report.html`, all or none.
-
-    Args:
-        out: the folder; empty or missing.
+    """Write `measurements.csv`, `grr.json` and `report.html`, all or none, into an empty or missing folder.
 
     Raises:
         StationError: the disk is full or the folder cannot be written; no file is left.

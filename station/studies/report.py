@@ -1,6 +1,5 @@
 """Study report: one HTML file with its figures inside."""
 
-from collections.abc import Sequence
 from importlib.metadata import version
 
 from station.charts.report import data_uri, templates
@@ -16,12 +15,7 @@ PAPER_SAMPLES = 30
 
 
 def share(count: int, of: int) -> str:
-    """Describe a share with its 95 % interval.
-
-    Args:
-        count: number of cases.
-        of: number of trials.
-    """
+    """Describe the share of cases in trials with its 95 % interval."""
     low, high = interval(count, of)
     return f"{count / of:.1%} ({low:.1%} to {high:.1%})"
 
@@ -119,12 +113,10 @@ def _samples(study: Study) -> list[dict[str, object]]:
                 "weight_g": sample.weight_g,
                 "length_mm": sample.length_mm,
                 "width_mm": sample.width_mm,
-                "areas": [_areas(sample.areas_px, sample.true_areas_px, place) for place in places],
+                "areas": [
+                    (sample.areas_px[at] * MM_PER_PX**2, sample.true_areas_px[at] * MM_PER_PX**2) for at in places
+                ],
                 "causes": ", ".join(sorted(cause.replace("_", " ") for cause in causes)),
             }
         )
     return rows
-
-
-def _areas(areas_px: Sequence[int], true_areas_px: Sequence[int], place: int) -> tuple[float, float]:
-    return areas_px[place] * MM_PER_PX**2, true_areas_px[place] * MM_PER_PX**2

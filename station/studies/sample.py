@@ -41,12 +41,7 @@ class SampleResult(BaseModel):
 
 
 def segmentation_of(fruit: str, method: str) -> Segmentation:
-    """Return a study's segmentation: the shipped recipe's parameters, with the requested method.
-
-    Args:
-        fruit: the recipe's name.
-        method: `paper` or `robust`.
-    """
+    """Return the segmentation of the fruit's shipped recipe, with the requested method, `paper` or `robust`."""
     return find_recipe(fruit).segmentation.model_copy(update={"method": method})
 
 

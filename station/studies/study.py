@@ -96,11 +96,7 @@ def _measured(tasks: Sequence[Task], request: Request) -> Iterator[SampleResult]
 
 
 def judged(request: Request, samples: Sequence[SampleResult]) -> Study:
-    """Judge each sample.
-
-    Args:
-        samples: all of them, in order.
-    """
+    """Judge each of all samples, in order."""
     closings = RESULT_CLOSINGS_MM[request.kind]
 
     def causes(sample: SampleResult, from_mm: float | None) -> frozenset[Cause]:
@@ -169,19 +165,7 @@ def rising(study: Study, sample: SampleResult) -> bool:
 def _curves(study: Study) -> bytes:
     text = StringIO(newline="")
     table = csv.writer(text)
-    table.writerow(
-        (
-            "sample",
-            "closing_mm",
-            "area_px",
-            "true_area_px",
-            "area_mm2",
-            "true_area_mm2",
-            "confidence",
-            "flags",
-            "failed",
-        )
-    )
+    text.write("sample,closing_mm,area_px,true_area_px,area_mm2,true_area_mm2,confidence,flags,failed\r\n")
     for sample, causes in zip(study.samples, study.causes, strict=True):
         for closing_mm, area, true_area, confidence, flags in zip(
             sample.closings_mm, sample.areas_px, sample.true_areas_px, sample.confidences, sample.flags, strict=True

@@ -78,10 +78,7 @@ def _tied_to(parent: int) -> None:
 
 
 def on_cluster(tasks: Sequence[Task], address: str) -> Iterator[SampleResult]:
-    """Measure on a Dask cluster whose workers have the same version of this program installed.
-
-    Args:
-        address: of the scheduler, such as `tcp://10.0.0.5:8786`.
+    """Measure on a Dask cluster with the same version of this program, at an address such as `tcp://10.0.0.5:8786`.
 
     Raises:
         BadInputError: Dask is not installed here, or the address does not answer.

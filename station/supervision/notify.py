@@ -17,11 +17,7 @@ _POLL_S = 0.5
 
 
 def notify(message: str) -> None:
-    """Send a message to the supervisor; does nothing if there is none, or if it does not listen any more.
-
-    Args:
-        message: `READY=1`, `WATCHDOG=1`, `STOPPING=1` or `STATUS=…`.
-    """
+    """Send `READY=1`, `WATCHDOG=1`, `STOPPING=1` or `STATUS=…` to the supervisor, if there is one that listens."""
     address = os.environ.get(SOCKET_VARIABLE, "")
     if not address:
         return
@@ -36,11 +32,8 @@ def notify(message: str) -> None:
 async def feed_watchdog(progressing: Callable[[], bool]) -> None:
     """Feed the supervisor's watchdog as long as there is progress, and end this process when it is orphaned.
 
-    Runs until cancelled. A supervisor that was killed cannot end its processes, so they end themselves, by the same
-    SIGTERM that it would have sent.
-
-    Args:
-        progressing: returns whether the process makes progress; called several times in each time-out.
+    Runs until cancelled, and asks for progress several times in each time-out. A supervisor that was killed cannot end
+    its processes, so they end themselves, by the same SIGTERM that it would have sent.
     """
     timeout_s = int(os.environ.get(WATCHDOG_VARIABLE, "0")) / 1e6
     parent = int(os.environ.get(PARENT_VARIABLE, "0"))

@@ -12,7 +12,6 @@ def station_programs(config: Path | None, logs: Path | None = None, *, outbox: b
     Args:
         config: the configuration's file; None for the usual one.
         logs: the folder of their logs; None for the supervisor's own output.
-        outbox: whether the process of the outbox runs too.
     """
     programs = [
         _program("service", logs, "service", *_config(config)),
@@ -23,14 +22,7 @@ def station_programs(config: Path | None, logs: Path | None = None, *, outbox: b
 
 
 def twin_program(config: Path | None, console_port: int, seed: int, logs: Path | None = None) -> Program:
-    """Return the process of the simulated world, which replaces the devices.
-
-    Args:
-        config: as the station's.
-        console_port: of its console.
-        seed: of the sensor's noise.
-        logs: as the station's.
-    """
+    """Return the process of the simulated world, which replaces the devices, with a seed of the sensor's noise."""
     options = ("--console", str(console_port), "--seed", str(seed))
     return _program("twin", logs, "twin", *_config(config), *options)
 

@@ -30,12 +30,7 @@ class Restarts(NamedTuple):
 
 
 def publish(file: Path, programs: Mapping[str, Restarts]) -> None:
-    """Write the file atomically; a write error is logged.
-
-    Args:
-        file: in a folder of the supervisor's.
-        programs: all of them by name.
-    """
+    """Write all programs by name to a file of the supervisor's, atomically; a write error is logged."""
     try:
         write_atomically(file, json.dumps(programs).encode(), durable=False)  # the counts end with the supervisor
     except OSError as error:

@@ -140,11 +140,7 @@ class _Child:
 
 
 class Supervisor:
-    """Supervisor of programs.
-
-    Args:
-        programs: in the order of their start, each when the one before is ready; ended in reverse.
-    """
+    """Supervisor of programs, each started when the one before is ready, and ended in reverse."""
 
     def __init__(self, programs: Sequence[Program], environment: Mapping[str, str] | None = None) -> None:
         self._programs = programs
@@ -158,11 +154,7 @@ class Supervisor:
         return any(child.ready for child in self._children if child.program.name == name)
 
     async def run(self, on_ready: Callable[[], None], ended: asyncio.Event) -> None:
-        """Start everything, supervise it, and end it.
-
-        Args:
-            on_ready: called once all are ready for the first time.
-            ended: set by the caller when everything is to end.
+        """Start everything, call `on_ready` once all are ready for the first time, and supervise until `ended` is set.
 
         Raises:
             SupervisionError: a program did not become ready at first, or one was given up; in this case when everything

@@ -37,9 +37,6 @@ _ANSWER_LIMIT_S = 2.0
 def bundle(site: Configuration, target: Path | IO[bytes]) -> tuple[str, ...]:
     """Write the bundle; a part that cannot be had is replaced by the reason, as a station in trouble has few parts.
 
-    Args:
-        target: the ZIP file to write, or an open one.
-
     Returns:
         The names of the parts.
 

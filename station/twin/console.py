@@ -117,11 +117,7 @@ class ConsoleServer:
 
 
 def ask(host: str, port: int, request: Mapping[str, Any], timeout_s: float = 3.0) -> Any:
-    """Ask a running twin's console one thing.
-
-    Args:
-        request: `do` and what it needs.
-        timeout_s: for the connection and for the answer, each.
+    """Ask a running twin's console one thing, `do` and what it needs; connection and answer have `timeout_s` each.
 
     Returns:
         The answer's result.

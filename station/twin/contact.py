@@ -84,11 +84,7 @@ class FruitOnGel:
         self._fine_gap = np.asarray(cv2.resize(self._gap, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
 
     def pressed(self, squeezed: Squeezed) -> Footprint:
-        """The gel under the fruit at one closing.
-
-        Args:
-            squeezed: what the closing does, from `Squeeze.at`.
-        """
+        """The gel under the fruit at one closing, from `Squeeze.at`."""
         approach = squeezed.approach_mm
         if approach <= 0:
             untouched = np.zeros(GRID_SHAPE, np.float32), np.zeros(SENSOR_SHAPE, np.uint8)

@@ -51,10 +51,7 @@ class FaultBoard:
         self._active[fault] = amount
 
     def clear(self, fault: str | None = None) -> None:
-        """Switch one fault off, or all of them.
-
-        Args:
-            fault: the fault's name; None for all.
+        """Switch one fault off by its name, or for None all of them.
 
         Raises:
             ValueError: the device has no such fault.
@@ -76,6 +73,13 @@ class FaultBoard:
     def amount(self, fault: str) -> float:
         """A fault's strength, 0.0 where it is off."""
         return self._active.get(fault, 0.0)
+
+    def gone(self, now_s: float, *own: str) -> bool:
+        """Whether the device cannot be reached: off, by a fault of its own, or as `intermittent` comes and goes."""
+        if any(map(self.active, (CommonFault.OFF, *own))):
+            return True
+        period_s = self.amount(CommonFault.INTERMITTENT)
+        return period_s > 0 and now_s % period_s >= period_s / 2
 
     def take_new(self) -> frozenset[str]:
         """The faults switched on since the last call, also those that are off again."""

@@ -146,12 +146,7 @@ class Fruit:
         return self.surface.gap_mm(relative_squared.astype(np.float32))
 
     def texture_mm(self, x_mm: FloatArray, y_mm: FloatArray) -> FloatArray:
-        """How far the skin lies below its highest points: pits, seeds, drupelets, calyx.
-
-        Args:
-            x_mm: as for `gap_mm`.
-            y_mm: likewise.
-        """
+        """How far the skin lies below its highest points, at places as for `gap_mm`: pits, seeds, drupelets, calyx."""
         return self.variety.texture(x_mm, y_mm, np.random.default_rng([self.seed, 1]))
 
 

@@ -56,21 +56,14 @@ class Gel:
         return np.asarray(np.polyval(_STIFFENING, np.minimum(slenderness, _SLENDEREST)), np.float64)
 
     def outer_share(self, distance_mm: FloatArray) -> FloatArray:
-        """What the glued underside leaves of a half-space's dent at a distance from the contact's edge.
-
-        Args:
-            distance_mm: distance outwards from the edge, any shape.
-        """
+        """What the glued underside leaves of a half-space's dent at distances, any shape, outwards from the edge."""
         return np.exp(-np.square(distance_mm / np.float32(self.outer_reach_mm)))
 
 
 def half_space_surface(ratio_squared: FloatArray) -> FloatArray:
-    """The dent of a half-space outside a paraboloid's contact, over its approach.
+    """The dent of a half-space outside a paraboloid's contact, over its approach, at (r/a)² of 1 or more, any shape.
 
     Johnson's equation 3.42a; at the edge it has the value 1/2 and the slope of the paraboloid.
-
-    Args:
-        ratio_squared: (r/a)², any shape, 1 or more.
     """
     angle = np.arcsin(1.0 / np.sqrt(ratio_squared))
     skirt = ((2.0 - ratio_squared) * angle + np.sqrt(ratio_squared - 1.0)) / np.float32(np.pi)
@@ -109,11 +102,7 @@ class Surface:
         return gap.astype(np.float32)
 
     def relative_squared(self, gap_mm: FloatArray) -> FloatArray:
-        """The inverse of `gap_mm`: how far out, squared, an ellipsoid has a gap.
-
-        Args:
-            gap_mm: any shape, not negative.
-        """
+        """The inverse of `gap_mm`: how far out, squared, an ellipsoid has a gap, any shape, not negative."""
         relative_gap = gap_mm / np.float32(self.depth_mm)
         cut = np.minimum(relative_gap, np.float32(1.0 - np.sqrt(1.0 - _POLE)))
         return (1.0 - np.square(1.0 - cut) + (relative_gap - cut)).astype(np.float32)

@@ -82,11 +82,7 @@ class Twin:
     """The simulated cell."""
 
     def __init__(self, options: TwinOptions, clock: Clock | None = None) -> None:
-        """Wire the cell; nothing listens before `start`.
-
-        Args:
-            clock: the twin's time; the machine's where left out.
-        """
+        """Wire the cell, by the machine's time without a `clock`; nothing listens before `start`."""
         clock = clock or SteadyClock()
         self.boards: dict[str, FaultBoard] = {"camera": digit_faults(), "gripper": gripper_faults()}
         self.world = World(clock, Gel(mm_per_px=options.mm_per_px))
@@ -202,10 +198,7 @@ def _beside_nest(arm: UrController, poses: ArmPoses) -> Callable[[], tuple[float
 
 
 async def run(options: TwinOptions, on_started: Callable[[Twin], None]) -> None:
-    """Run the twin until SIGINT or SIGTERM.
-
-    Args:
-        on_started: called once every port is open.
+    """Run the twin until SIGINT or SIGTERM; `on_started` is called once every port is open.
 
     Raises:
         BadInputError: an address cannot be had.

@@ -61,11 +61,7 @@ class Squeeze:
         self._closing = approach + back + sponge
 
     def at(self, closing_mm: float) -> Squeezed:
-        """What a closing does; all zero before the onset, and no more than the fruit's crushed end.
-
-        Args:
-            closing_mm: mm since first contact; negative before it.
-        """
+        """What a closing, mm since first contact, does; zero before the onset, no more than the fruit's crushed end."""
         closing = max(0.0, closing_mm)
         approach = float(np.interp(closing, self._closing, self._approach))
         return Squeezed(

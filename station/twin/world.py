@@ -31,9 +31,6 @@ class World:
 
     Squeezed beyond its yield force and let go, a fruit stays narrower and softer: by a quarter of the closing
     beyond the yield, and by up to half of its modulus.
-
-    Args:
-        clock: the twin's time, for creep.
     """
 
     def __init__(self, clock: Clock, gel: Gel | None = None) -> None:
@@ -77,19 +74,11 @@ class World:
         self._fruit = self._contact = self._squeeze = self._since_s = self._worst = None
 
     def width_mm(self, opening_mm: float) -> float:
-        """The room between gel and sponge at an opening of the gripper.
-
-        Args:
-            opening_mm: distance between the gripper's own pads, 0 to 85.
-        """
+        """The room between gel and sponge at an opening of the gripper's own pads, 0 to 85 mm."""
         return opening_mm - DIGIT_MM
 
     def force_N(self, opening_mm: float) -> float:  # noqa: N802 (the gripper's protocol)
-        """The force that pushes the fingers apart at an opening, N.
-
-        Args:
-            opening_mm: distance between the gripper's own pads, 0 to 85.
-        """
+        """The force that pushes the fingers apart at an opening of the gripper's own pads, 0 to 85 mm, N."""
         self._opening_mm = opening_mm
         return self._squeezed_at(opening_mm).force_n
 

@@ -226,11 +226,7 @@ def _line_means(strips: FloatImage, weight: FloatImage, axis: int, prior: float)
 
 
 def thinned(field: FloatImage) -> FloatImage:
-    """Every few pixels of a field, about 28 along each side: enough for a median.
-
-    Args:
-        field: shape (height, width).
-    """
+    """Every few pixels of a field, shape (height, width), about 28 along each side: enough for a median."""
     height, width = field.shape
     return field[:: max(1, height // _MEDIAN_SIDE), :: max(1, width // _MEDIAN_SIDE)]
 
@@ -238,9 +234,7 @@ def thinned(field: FloatImage) -> FloatImage:
 def weighted_median(values: npt.NDArray[np.floating], weight: npt.NDArray[np.floating]) -> float:
     """The value below which half of the weight lies, 0 where there is no weight; of a field only every few pixels.
 
-    Args:
-        values: any shape.
-        weight: as many as `values`, not negative.
+    The values have any shape; there are as many weights, none of them negative.
     """
     if values.ndim == 2:
         values, weight = thinned(values), thinned(weight)
@@ -253,22 +247,12 @@ def weighted_median(values: npt.NDArray[np.floating], weight: npt.NDArray[np.flo
 
 
 def quantile(values: npt.NDArray[np.floating], share: float) -> float:
-    """The value below which a share of all lies, of those that occur.
-
-    Args:
-        values: any shape, not empty.
-        share: 0 to 1.
-    """
+    """The value below which a share, 0 to 1, of all lies, of those that occur; any shape, not empty."""
     return quantiles(values, share)[0]
 
 
 def quantiles(values: npt.NDArray[np.floating], *shares: float) -> list[float]:
-    """Several quantiles, as `quantile`, in one pass.
-
-    Args:
-        values: any shape, not empty.
-        shares: 0 to 1.
-    """
+    """Several quantiles, as `quantile`, in one pass."""
     values = values.ravel()
     places = [int(share * (values.size - 1)) for share in shares]
     return [float(one) for one in np.partition(values, places)[places]]

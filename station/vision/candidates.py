@@ -67,10 +67,7 @@ def body_candidates(moved: Movement, threshold: float, constants: Constants) -> 
 def around(place: tuple[int, int], moved: Movement, constants: Constants) -> Candidates:
     """Where a contact too weak to curve the gel clear of the noise may lie: a small disc, and what has moved with it.
 
-    Args:
-        place: x and y, px of the movement.
-        moved: from `region.movement`.
-        constants: the level's window.
+    The place is x and y, px of the movement.
     """
     seen = level_of(moved, constants.level_window)
     start = disc(seen.levels.shape, place, _WEAK_RADIUS_PX)
@@ -81,13 +78,7 @@ def around(place: tuple[int, int], moved: Movement, constants: Constants) -> Can
 
 
 def disc(shape: tuple[int, ...], place: tuple[int, int], radius_px: int) -> Mask:
-    """A filled circle, 1 in 0.
-
-    Args:
-        shape: height and width.
-        place: its middle, x and y.
-        radius_px: its radius.
-    """
+    """A filled circle, 1 in 0, of a radius about x and y, in an image of a height and width."""
     empty = np.zeros(shape, np.uint8)
     return np.asarray(cv2.circle(empty, place, radius_px, color=1, thickness=cv2.FILLED), np.uint8)
 

@@ -17,12 +17,7 @@ _PER_E_FOLD = 4.0
 
 
 def changed(moved: Movement, noise_levels: float, constants: Constants) -> Mask:
-    """Where the image has changed.
-
-    Args:
-        moved: from `region.movement`.
-        noise_levels: the change's standard deviation where nothing touches.
-        constants: the threshold, in times the noise.
+    """Where the image has changed by some times the change's standard deviation where nothing touches.
 
     Returns:
         Shape (height, width) at half the working size, 0 or 1.
@@ -32,27 +27,17 @@ def changed(moved: Movement, noise_levels: float, constants: Constants) -> Mask:
 
 
 def agreement(contact_px: float, changed_px: float, constants: Constants) -> float:
-    """How far a contact's contour agrees with the changed area in size, 0 to 1.
+    """How far a contact's area agrees with the changed area, in one unit, in size, 0 to 1.
 
     A contact whose contour takes in only a small part of what has changed is a part of a larger one, or another thing;
     one that hardly holds any change has been drawn around nothing. Between the two says little: a halo changes, and a
     flat centre does not.
-
-    Args:
-        contact_px: the contact area.
-        changed_px: the changed area, in the same unit.
-        constants: the two shares beyond which they disagree.
     """
     share = max(changed_px, 1.0) / max(contact_px, 1.0)
     return float(min(1.0, constants.witness_most / share, share / constants.witness_least) ** 2)
 
 
 def agreement_of_growth(contact_px: tuple[float, float], changed_px: tuple[float, float]) -> float:
-    """How far a contact's contour agrees with the changed area on whether the contact has shrunk, 0 to 1.
-
-    Args:
-        contact_px: contact area at the last step and now.
-        changed_px: changed area then and now.
-    """
+    """How far contour and changed area, each at the last step and now, agree on a contact's shrinking, 0 to 1."""
     grown, witnessed = (float(np.log(max(now, 1.0) / max(then, 1.0))) for then, now in (contact_px, changed_px))
     return float(np.exp(-_PER_E_FOLD * max(0.0, min(0.0, witnessed) - grown)))

@@ -29,15 +29,10 @@ def background_spread(signal: FloatImage, background: FloatImage) -> float:
 
 
 def edge_confidence(edge: Edge, noise_levels: float, constants: Constants) -> float:
-    """Signal to noise across the edge times the share of the edge that is seen to fall, 0 to 1.
+    """Signal to noise (`background_spread`) across the edge times the share of it that is seen to fall, 0 to 1.
 
     The first factor is q²/(q² + 4²) of the median drop q in units of the noise; the second is the share of the seen
     rays on which the change falls at all.
-
-    Args:
-        edge: with its drops in grey levels.
-        noise_levels: from `background_spread`.
-        constants: the drop at which the confidence is one half.
     """
     if not edge.seen.any():
         return 0.0
@@ -48,12 +43,9 @@ def edge_confidence(edge: Edge, noise_levels: float, constants: Constants) -> fl
 
 
 def agreement(areas: Sequence[float]) -> float:
-    """How far several frames of one width step agree, 0 to 1: one over one plus ten times their relative spread.
+    """How far areas, any unit, of one step's frames agree, 0 to 1: one over one plus ten times their relative spread.
 
     Multiply an area's confidence by it. One frame agrees with itself.
-
-    Args:
-        areas: of the frames of one step, any unit.
 
     Raises:
         ValueError: there is none.

@@ -100,35 +100,16 @@ def contact_from_mask(
     changed_area_px: int | None = None,
     trace: object = None,
 ) -> Contact:
-    """Measure a mask: its area and centroid, with the flags that follow from it added.
-
-    Args:
-        mask: shape (height, width), dtype uint8, 0 or 255.
-        flags: what the method itself has to say.
-        confidence: as in `Contact`.
-        gate: as in `Contact`.
-        drift_levels: as in `Contact`.
-        is_light: as in `Contact`.
-        changed_area_px: as in `Contact`.
-        trace: as in `Contact`.
-    """
-    area_px = cv2.countNonZero(mask)
-    if area_px == 0:
-        nothing = frozenset[Flag]() if Flag.UNDECIDED in flags else frozenset({Flag.NO_CONTACT})
-        return Contact(
-            mask,
-            0,
-            None,
-            flags | nothing,
-            confidence,
-            gate,
-            drift_levels,
-            changed_area_px=changed_area_px,
-            trace=trace,
-        )
-    # `cv2.moments` of a mask takes ten times as long.
-    across, down = (cv2.reduce(mask, axis, cv2.REDUCE_SUM, dtype=cv2.CV_32S).ravel() for axis in (0, 1))
-    x_px, y_px = (float(sums @ np.arange(sums.size)) / (255 * area_px) for sums in (across, down))
-    if across[0] or across[-1] or down[0] or down[-1]:
-        flags |= {Flag.CUT_BY_BORDER}
-    return Contact(mask, area_px, (x_px, y_px), flags, confidence, gate, drift_levels, is_light, changed_area_px, trace)
+    """Measure a mask, 0 or 255: its area and centroid, with the flags that follow added; the rest as in `Contact`."""
+    area_px, centroid_px = cv2.countNonZero(mask), None
+    if area_px:
+        # `cv2.moments` of a mask takes ten times as long.
+        across, down = (cv2.reduce(mask, axis, cv2.REDUCE_SUM, dtype=cv2.CV_32S).ravel() for axis in (0, 1))
+        x_px, y_px = (float(sums @ np.arange(sums.size)) / (255 * area_px) for sums in (across, down))
+        centroid_px = x_px, y_px
+        if across[0] or across[-1] or down[0] or down[-1]:
+            flags |= {Flag.CUT_BY_BORDER}
+    elif Flag.UNDECIDED not in flags:
+        flags |= {Flag.NO_CONTACT}
+    is_light = is_light and area_px > 0
+    return Contact(mask, area_px, centroid_px, flags, confidence, gate, drift_levels, is_light, changed_area_px, trace)

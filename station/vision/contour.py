@@ -46,11 +46,7 @@ class Rays(NamedTuple):
 
     @classmethod
     def about(cls, mask: Mask) -> Self:
-        """The rays of a region.
-
-        Args:
-            mask: shape (height, width), 0 or not, not empty.
-        """
+        """The rays of a region, shape (height, width), 0 or not, not empty."""
         # Sums over every second row and column: `cv2.moments` of a mask takes forty times as long.
         inside = (mask[::2, ::2] > 0).astype(np.float32)
         y, x = (np.arange(0.5, 2 * side, 2, dtype=np.float32) for side in inside.shape)
@@ -74,19 +70,11 @@ class Rays(NamedTuple):
         return even - math.sqrt(max(0.0, even**2 - 1))
 
     def reach(self, mask: Mask) -> float:
-        """The radius of a circle of a region's area, in the rays' unit, at least 3.
-
-        Args:
-            mask: 0 or not.
-        """
+        """The radius of a circle of a region's area, in the rays' unit, at least 3."""
         return max(3.0, float(np.sqrt(cv2.countNonZero(mask) / np.pi)))
 
     def places(self, away: _Floats, every: int = 1) -> tuple[FloatImage, FloatImage]:
-        """The places at some distances on the rays.
-
-        Args:
-            away: in the rays' unit, shape (steps,) or (rays, steps).
-            every: of the rays, each so-manieth.
+        """The places at distances in the rays' unit, shape (steps,) or (rays, steps), on every ray or every n-th one.
 
         Returns:
             x and y, each of shape (rays, steps), dtype float32, px.
@@ -96,20 +84,11 @@ class Rays(NamedTuple):
         return x, y
 
     def points(self, radii: _Floats) -> _Floats:
-        """The point at one distance on each ray, shape (64, 2).
-
-        Args:
-            radii: shape (64,), in the rays' unit.
-        """
+        """The points, shape (64, 2), at distances in the rays' unit, shape (64,)."""
         return self.middle + (self.axes @ (_CIRCLE * radii)).T
 
     def moved_to(self, points: _Floats, shape: tuple[int, int]) -> tuple[Self, _Floats]:
-        """Rays from the middle of a closed line, and that line's distances on them.
-
-        Args:
-            points: shape (64, 2), px.
-            shape: height and width of the image, in which the middle stays.
-        """
+        """Rays from the middle, kept in the image, of a closed line, shape (64, 2), px, and its distances on them."""
         moments = cv2.moments(points.astype(np.float32))
         if moments["m00"] <= 0:
             return self, np.hypot(*(np.linalg.inv(self.axes) @ (points - self.middle).T))
@@ -217,12 +196,7 @@ def _reach(region: Mask, rays: Rays) -> _Floats:
 
 
 def inside_image(points: _Floats, shape: tuple[int, int]) -> npt.NDArray[np.bool_]:
-    """Which points lie in an image.
-
-    Args:
-        points: shape (n, 2), x and y, px.
-        shape: the image's height and width.
-    """
+    """Which points, shape (n, 2), x and y in px, lie in an image of this height and width."""
     return (points >= 0).all(axis=1) & (points[:, 0] <= shape[1] - 1) & (points[:, 1] <= shape[0] - 1)
 
 

@@ -71,12 +71,7 @@ def first_background(response: FloatImage, least_curvature: float, constants: Co
 
 
 def curvature_noise(response: FloatImage, background: Background) -> float:
-    """The curvature that the background shows: its median there.
-
-    Args:
-        response: of the change without its background, grey levels per pixel.
-        background: of the same frame.
-    """
+    """The median of the curvature, grey levels per pixel, that the background of the same frame shows."""
     if background.share < LEAST_BACKGROUND:
         return 0.0
     weight = resized(background.weight, (response.shape[1], response.shape[0]))

@@ -29,11 +29,7 @@ judged specks that had moved begin at 0.42: measured on 100 gels of the twin wit
 
 
 class Debris:
-    """The debris on one reference.
-
-    Args:
-        light: the reference at the working size, shape (height, width, 3), grey levels.
-    """
+    """The debris on one reference, at the working size, shape (height, width, 3), grey levels."""
 
     def __init__(self, light: FloatImage) -> None:
         height, width = light.shape[:2]

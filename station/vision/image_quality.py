@@ -12,21 +12,13 @@ DEAD_LED = 1 / 3
 
 
 def light(image: Image) -> tuple[float, float, float]:
-    """Return the mean of each colour, grey levels.
-
-    Args:
-        image: shape (height, width, 3), dtype uint8, BGR.
-    """
+    """Return the mean of each colour of a picture, shape (height, width, 3), dtype uint8, BGR; grey levels."""
     blue, green, red = image.mean(axis=(0, 1))
     return float(blue), float(green), float(red)
 
 
 def sharpness(image: Image) -> float:
-    """Return the root mean square of the detail that a lens shows and fog hides; grey levels.
-
-    Args:
-        image: shape (height, width, 3), dtype uint8.
-    """
+    """Return the root mean square, grey levels, of the detail that a lens shows and fog hides; dtype uint8."""
     finer, coarser = (cv2.GaussianBlur(image, (0, 0), sigma).astype(np.float32) for sigma in _DETAIL_PX)
     detail = finer - coarser
     detail -= detail.mean(axis=0)  # the light drifts in bands along the columns, which is no detail

@@ -81,16 +81,7 @@ def find_outline(
 
 
 def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)) -> Mask:
-    """What an edge encloses.
-
-    Args:
-        edge: in pixels of half the working size.
-        shape: height and width of the mask.
-        scale: of the mask over half the working size, along x and y.
-
-    Returns:
-        Of that shape, 0 or 255.
-    """
+    """What an edge, px of half the working size, encloses: a mask, 0 or 255, of a shape, scaled along x and y."""
     points = (edge.points + 0.5) * scale - 0.5
     mask = np.zeros(shape, np.uint8)
     fixed = np.rint(points * (1 << SUBPIXEL_BITS)).astype(np.int32)

@@ -35,14 +35,7 @@ class PaperMethod:
         *,
         firm_only: bool = False,
     ) -> Contact:
-        """Find the contact in an image as the paper prints it.
-
-        Args:
-            image: shape (height, width, 3), dtype uint8, BGR, of the reference's size.
-            on_stage: gets the pictures `difference`, `denoised` and `segmented`.
-            previous: has no part in the method as printed.
-            agreed: nor has this.
-            firm_only: nor this: it finds no weak contacts.
+        """Find the contact as the paper prints it, in which `previous`, `agreed` and `firm_only` have no part.
 
         Raises:
             ValueError: the image's shape or dtype is not the reference's.
@@ -60,12 +53,7 @@ class PaperMethod:
 
 
 def amplified_difference(image: Image, reference: Image, amplification: float) -> Image:
-    """Absolute difference per colour times the amplification, clipped to 0..255.
-
-    Args:
-        image: shape (height, width, 3), dtype uint8.
-        reference: shape and dtype as `image`.
-        amplification: factor, no unit.
+    """Absolute difference of two images of one shape, dtype uint8, times the amplification, clipped to 0..255.
 
     Raises:
         ValueError: the two differ in shape or are not uint8.
@@ -79,12 +67,7 @@ def amplified_difference(image: Image, reference: Image, amplification: float) -
 
 
 def denoise(difference: Image, parameters: PaperParameters) -> Image:
-    """Non-local means in colour with the paper's strengths and windows.
-
-    Args:
-        difference: shape (height, width, 3), dtype uint8.
-        parameters: strengths in grey levels and windows in pixels.
-    """
+    """Non-local means in colour, shape (height, width, 3), dtype uint8, with the paper's strengths and windows."""
     denoised = cv2.fastNlMeansDenoisingColored(
         difference,
         None,
@@ -97,11 +80,7 @@ def denoise(difference: Image, parameters: PaperParameters) -> Image:
 
 
 def brightest_cluster(denoised: Image, parameters: PaperParameters) -> Mask:
-    """K-means over the pixels' colours; the cluster whose centre is brightest becomes the mask.
-
-    Args:
-        denoised: shape (height, width, 3), dtype uint8.
-        parameters: number of clusters, starts and seed.
+    """K-means over the colours, (height, width, 3), uint8; the cluster whose centre is brightest becomes the mask.
 
     Returns:
         Shape (height, width), dtype uint8, 0 or 255.
@@ -123,15 +102,7 @@ def brightest_cluster(denoised: Image, parameters: PaperParameters) -> Mask:
 
 
 def clean(mask: Mask, parameters: PaperParameters) -> Mask:
-    """Closing and opening, then every component below the smallest is dropped.
-
-    Args:
-        mask: shape (height, width), dtype uint8, 0 or 255.
-        parameters: kernel in pixels; smallest component in pixels of a 640x480 image.
-
-    Returns:
-        Shape and dtype as `mask`.
-    """
+    """Closing and opening of a mask, 0 or 255; components below the smallest, in px of a 640x480 image, are dropped."""
     kernel = np.ones((parameters.kernel_px, parameters.kernel_px), np.uint8)
     closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel)
     opened = cv2.morphologyEx(closed, cv2.MORPH_OPEN, kernel)

@@ -21,11 +21,7 @@ class PressTracker:
         self._ahead: dict[int, tuple[Image, Contact]] = {}
 
     def prepare_next(self, image: Image) -> None:
-        """Measure one frame of the step that comes next, so that `measure_step` has less to do.
-
-        Args:
-            image: of the reference's shape; the same object is handed to `measure_step` later.
-        """
+        """Measure one frame of the next step, the same object that `measure_step` gets, which then has less to do."""
         self._ahead[id(image)] = image, self._method.measure(image, previous=self._previous)
 
     def measure_step(self, frames: Sequence[Image], mean: Image | None = None) -> Contact:

@@ -21,14 +21,10 @@ class DenoisingQuality:
 
 
 def denoising_quality(noisy: Image, denoised: Image) -> DenoisingQuality:
-    """Compare an image before and after denoising.
+    """Compare an image, shape (height, width, 3), dtype uint8, before and after denoising.
 
     SSIM is Wang et al., IEEE Transactions on Image Processing 13 (2004) 600, with its Gaussian window of 11 pixels
     and sigma 1.5.
-
-    Args:
-        noisy: shape (height, width, 3), dtype uint8.
-        denoised: shape and dtype as `noisy`.
 
     Raises:
         ValueError: the two differ in shape or dtype.

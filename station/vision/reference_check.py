@@ -76,8 +76,7 @@ class ReferenceCheck:
     def mismatch(self, frame: FloatImage) -> float:
         """The statistic over its threshold: above 1 the frame shows another unit, or another sensor.
 
-        Args:
-            frame: cut off and averaged down as the reference.
+        The frame is cut off and averaged down as the reference.
         """
         cells = _cells(frame)
         _, spread = cv2.meanStdDev(cells - self._cells)
@@ -143,12 +142,7 @@ def _patterns(cells: FloatImage) -> list[FloatImage]:
 
 
 def _pattern(cells: FloatImage, band_cells: tuple[float, float]) -> FloatImage:
-    """What is between noise and drift in size, less each column's mean: streaks along the columns drift.
-
-    Args:
-        cells: shape (rows, columns, 3), grey levels.
-        band_cells: standard deviations of the Gaussians between which it is.
-    """
+    """What is between noise and drift in size, less each column's mean: streaks along the columns drift."""
     fine, wide = (cv2.GaussianBlur(cells, (0, 0), sigma) for sigma in band_cells)
     band = fine - wide
     return np.asarray(band - cv2.reduce(band, 0, cv2.REDUCE_AVG), np.float32)

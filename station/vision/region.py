@@ -86,14 +86,7 @@ class Region(NamedTuple):
 
 
 def movement(half: FloatImage, background: Background, flat_field: FloatImage, curvature: FloatImage) -> Movement:
-    """Prepare a frame's change.
-
-    Args:
-        half: without background, at half the working size, shape (height, width, 3), grey levels.
-        background: of the same frame.
-        flat_field: from `flat_field_correction`, shape (height, width).
-        curvature: from `curvature`, shape (height, width).
-    """
+    """Prepare a frame's change without background, at half the working size, shape (height, width, 3), grey levels."""
     change = np.asarray(cv2.GaussianBlur(half, (0, 0), CHANGE_BLUR_PX), np.float32)
     weight = resized(background.weight, (half.shape[1], half.shape[0]))
     squared = length_squared(change)
@@ -244,12 +237,7 @@ def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float
 
 
 def has_moved_widely(moved: Movement, constants: Constants) -> bool:
-    """Whether much of the frame has moved far beyond what drift and compression leave over.
-
-    Args:
-        moved: from `movement`.
-        constants: how much of the frame, and how far.
-    """
+    """Whether much of the frame has moved far beyond what drift and compression leave over."""
     levels = level_of(moved, constants.level_window).levels
     return quantile(thinned(levels), 1 - constants.wide_share) > constants.wide_levels
 
@@ -265,21 +253,12 @@ class Level(NamedTuple):
     """The background's."""
 
     def spread(self, moved: Movement) -> float:
-        """The root's standard deviation in the background, grey levels.
-
-        Args:
-            moved: that the level is of.
-        """
+        """The root's standard deviation in the background of the movement that the level is of, grey levels."""
         return NORMAL_OF_MEDIAN * _in_background(np.abs(self.roots - self.background_root), moved)
 
 
 def level_of(moved: Movement, window_px: float) -> Level:
-    """The change's level in a window.
-
-    Args:
-        moved: from `movement`.
-        window_px: the Gaussian window's standard deviation, px of half the working size.
-    """
+    """The change's level in a Gaussian window of a standard deviation in px of half the working size."""
     mean = blurred(moved.squared, window_px)
     few = thinned(mean)
     floor = _in_background(few, moved)
@@ -365,9 +344,5 @@ def _inner_hull(region: Mask, share: float) -> Mask:
 
 
 def radius_of(region: Mask) -> float:
-    """The radius of a circle of a region's area, at least 3, px.
-
-    Args:
-        region: 0 or not.
-    """
+    """The radius of a circle of a region's area, at least 3, px."""
     return max(_LEAST_RADIUS_PX, float(np.sqrt(cv2.countNonZero(region) / np.pi)))

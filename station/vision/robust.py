@@ -20,6 +20,7 @@ from station.vision.constants import CONSTANTS, Constants
 from station.vision.contact import Contact, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.curvature import curvature, curvature_noise, first_background
 from station.vision.debris import Debris
+from station.vision.median import median_image
 from station.vision.outline import Outline, find_outline
 from station.vision.reference_check import ReferenceCheck
 from station.vision.region import (
@@ -168,8 +169,7 @@ class RobustMethod:
         if unknown := without.difference(STAGES):
             raise ValueError(f"no such stage: {', '.join(sorted(unknown))}; there are {', '.join(STAGES)}")
         self._shape, self._parameters, self._constants, self._without = shape, parameters, constants, without
-        reference = references[0] if len(references) == 1 else np.median(np.stack(references), axis=0).astype(np.uint8)
-        self._reference = working_image(reference)
+        self._reference = working_image(median_image(references))
         self._model = BackgroundModel(self._reference, constants)
         light = clipped(self._reference)
         height, width = light.shape[:2]
@@ -224,14 +224,7 @@ class RobustMethod:
         *,
         firm_only: bool = False,
     ) -> Contact:
-        """Find the contact in an image.
-
-        Args:
-            image: shape (height, width, 3), dtype uint8, BGR, of the references' size.
-            on_stage: gets the pictures named in `stages`.
-            previous: the same contact at the last step of less compression; a single image is measured without.
-            agreed: how far the frames agree of which the image is the mean, 0 to 1; the confidence is multiplied by it.
-            firm_only: leave out the search for weak contacts; an image with a firm one gives the same.
+        """See `Method.measure`; a firm contact is the same with `firm_only`.
 
         Raises:
             ValueError: the image's shape or dtype is not the references'.
@@ -256,9 +249,6 @@ class RobustMethod:
 
     def weak_response(self, image: Image) -> tuple[FloatImage, float]:
         """The weak-contact detector's response to an image, and its threshold.
-
-        Args:
-            image: as for `measure`.
 
         Returns:
             Shape (height, width) at half the working size, as `WeakContactDetector.response`, and the threshold.

@@ -27,10 +27,6 @@ class Scale:
     def typical(cls, height_px: int, width_px: int) -> "Scale":
         """The scale of a unit that has not been calibrated, for an image of the whole field.
 
-        Args:
-            height_px: of the image.
-            width_px: of the image.
-
         Raises:
             ValueError: a side is not positive.
         """
@@ -39,10 +35,6 @@ class Scale:
         return cls(TYPICAL_MM_PER_PX * PRINTED_LONG_SIDE_PX / max(height_px, width_px), TYPICAL_UNCERTAINTY)
 
     def area_mm2(self, area_px: float) -> tuple[float, float]:
-        """An area and its uncertainty, both in mm².
-
-        Args:
-            area_px: the area in pixels.
-        """
+        """An area in pixels, and its uncertainty, both in mm²."""
         area = area_px * self.mm_per_px**2
         return area, 2 * self.uncertainty * area

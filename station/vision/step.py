@@ -43,11 +43,7 @@ def measure_step(
 
 
 def mean_image(frames: Sequence[Image]) -> Image:
-    """The mean of frames, rounded; of one frame itself.
-
-    Args:
-        frames: one or more of one shape, dtype uint8.
-    """
+    """The mean of one or more frames of one shape, dtype uint8, rounded; of one frame itself."""
     if len(frames) == 1:
         return frames[0]
     total = np.zeros(frames[0].shape, np.uint16)

@@ -17,12 +17,7 @@ _GROOVE_PX, _SPECK_PX, _ROOM_PX = 7, 5, 9
 
 
 def strength(length: FloatImage, region: Mask) -> float:
-    """What the strongest fifth of a region's change reaches, grey levels.
-
-    Args:
-        length: of the change, shape (height, width), grey levels.
-        region: shape of `length`, 0 or not, not empty.
-    """
+    """What the strongest fifth of a change, shape (height, width), reaches in a region, not empty; grey levels."""
     few = length[::2, ::2][region[::2, ::2] > 0]
     return quantile(few if few.size else length[region > 0], _STRONG_QUANTILE)
 

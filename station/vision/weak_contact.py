@@ -137,31 +137,18 @@ class WeakContactDetector:
         return WeakResponse(np.sqrt(total) * self._valid, compression)
 
     def place(self, response: WeakResponse) -> tuple[int, int] | None:
-        """Find where something touches: x and y, or None where nothing exceeds the noise.
-
-        Args:
-            response: from `response`.
-        """
+        """Find where something touches: x and y, or None where nothing exceeds the noise."""
         _, strongest, _, (x, y) = cv2.minMaxLoc(response.field)
         return (x, y) if strongest > self.threshold * response.compression else None
 
     def near(self, place: tuple[int, int]) -> tuple[slice, slice]:
-        """Rows and columns within the dent's reach of a place.
-
-        Args:
-            place: x and y, px.
-        """
+        """Rows and columns within the dent's reach of a place, x and y, px."""
         x, y = place
         reach_px = self._reach_px
         return slice(max(0, y - reach_px), y + reach_px + 1), slice(max(0, x - reach_px), x + reach_px + 1)
 
     def supports(self, region: Mask, response: WeakResponse) -> bool:
-        """Whether a region's slopes are more than noise and drift; True where the reference is not valid enough to say.
-
-        Args:
-            region: shape (height, width), 0 or not.
-            response: from `response`.
-        """
+        """Whether a region's slopes exceed noise and drift; True where the reference is not valid enough to say."""
         if np.mean(self._valid[region > 0]) < _LEAST_VALID:
             return True
         with_rim = cv2.dilate(region, np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0

@@ -30,11 +30,7 @@ _SUM = np.ones((1, 3), np.float32)
 
 
 def working_image(image: Image) -> Image:
-    """The image averaged down to the working size.
-
-    Args:
-        image: shape (height, width, 3), dtype uint8.
-    """
+    """The image, shape (height, width, 3), dtype uint8, averaged down to the working size."""
     height, width = image.shape[:2]
     shrink = LONG_SIDE_PX / max(height, width)
     if shrink >= 1:
@@ -44,16 +40,12 @@ def working_image(image: Image) -> Image:
 
 
 def clipped(image: Image) -> FloatImage:
-    """The image cut off where it saturates, as float32.
-
-    Args:
-        image: any shape, dtype uint8.
-    """
+    """The image, any shape, dtype uint8, cut off where it saturates, as float32."""
     return cv2.threshold(image, SATURATED_LEVEL, 0, cv2.THRESH_TRUNC)[1].astype(np.float32)
 
 
 def resized(field: FloatImage, size: tuple[int, int]) -> FloatImage:
-    """A field at another size: averaged when it shrinks, linear when it grows.
+    """A field at another size: averaged where it shrinks, linear where it grows.
 
     Args:
         field: shape (height, width) or (height, width, channels), float32.
@@ -69,12 +61,7 @@ def resized(field: FloatImage, size: tuple[int, int]) -> FloatImage:
 
 
 def blurred(field: FloatImage, sigma_px: float) -> FloatImage:
-    """A field under a Gaussian window: a wide one at half the size, which loses nothing and takes less time.
-
-    Args:
-        field: shape (height, width) or (height, width, channels), float32.
-        sigma_px: the window's standard deviation.
-    """
+    """A field under a Gaussian window: a wide one at half the size, which loses nothing and takes less time."""
     if sigma_px <= HALF_FROM_PX:
         return np.asarray(cv2.GaussianBlur(field, (0, 0), sigma_px), np.float32)
     size = (field.shape[1], field.shape[0])
@@ -83,25 +70,10 @@ def blurred(field: FloatImage, sigma_px: float) -> FloatImage:
 
 
 def length_squared(change: FloatImage) -> FloatImage:
-    """The squared length over the channels.
-
-    Args:
-        change: shape (height, width, 3).
-
-    Returns:
-        Shape (height, width).
-    """
+    """The squared length over the channels of a change, (height, width, 3): shape (height, width)."""
     return product(change, change)
 
 
 def product(one: FloatImage, other: FloatImage) -> FloatImage:
-    """The product summed over the channels.
-
-    Args:
-        one: shape (height, width, 3).
-        other: likewise.
-
-    Returns:
-        Shape (height, width).
-    """
+    """The product of two, (height, width, 3), summed over the channels: shape (height, width)."""
     return np.asarray(cv2.transform(cv2.multiply(one, other), _SUM), np.float32)

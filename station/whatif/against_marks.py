@@ -66,14 +66,7 @@ class Compared:
 
 
 def compared(results: Iterable[Replayed], marks: Mapping[int, Mark]) -> Compared | None:
-    """Compare a draft's outcomes with the marks.
-
-    Args:
-        marks: people's marks, by the inspections' sequence.
-
-    Returns:
-        None if no fruit of the results is marked.
-    """
+    """Compare a draft's outcomes with people's marks by sequence; None if no fruit of the results is marked."""
     marked = [(each, marks[each.sequence] == "good") for each in results if each.sequence in marks]
     decided = [(each, good) for each, good in marked if each.after != "UNDECIDABLE"]
     if not marked:

@@ -36,12 +36,7 @@ class Costs:
     """Share of damaged fruit on the line, above 0 and below 1."""
 
     def of(self, false_accepts: float, false_rejects: float) -> float:
-        """Return the cost of an average fruit of the line, in units of one false reject.
-
-        Args:
-            false_accepts: share of the damaged fruit that pass.
-            false_rejects: share of the sound fruit that do not pass.
-        """
+        """Return the cost of an average fruit, in false rejects, by the shares of damaged and sound fruit in error."""
         return self.damaged_share * self.false_accept * false_accepts + (1 - self.damaged_share) * false_rejects
 
 
@@ -86,10 +81,7 @@ def marked_fruit(press: Press, recipe: Recipe, closing_mm: float, *, good: bool,
     limit or the growth has proven it damaged: those the draft keeps.
 
     Args:
-        press: as stored.
         recipe: that it was pressed by.
-        closing_mm: of the limit.
-        good: the fruit's mark.
         draft: the recipe that the limit is proposed for.
     """
     limits = sized_limits(press, recipe)
@@ -111,9 +103,6 @@ def marked_fruit(press: Press, recipe: Recipe, closing_mm: float, *, good: bool,
 
 def exponent_of(fruit: Sequence[MarkedFruit]) -> Exponent | None:
     """Fit the exponent of the area in the length: one slope for good and bad fruit, each with its own level.
-
-    Args:
-        fruit: marked ones.
 
     Returns:
         None with fewer than four fruit of known length and area, or all of one length.
@@ -137,15 +126,10 @@ def exponent_of(fruit: Sequence[MarkedFruit]) -> Exponent | None:
 
 
 def at_reference(fruit: Sequence[MarkedFruit], exponent: float, reference_mm: float) -> tuple[Values, Values]:
-    """Return the least limits by which fruit pass, converted to a fruit of the reference length.
-
-    Args:
-        fruit: marked ones.
-        exponent: of the area in the length.
-        reference_mm: of the recipe's limits.
+    """Return the least limits, mm², by which fruit pass, converted to the reference length of the recipe's limits.
 
     Returns:
-        Of the good, and of the bad, mm², each in the order given.
+        Of the good, and of the bad, each in the order given.
     """
     factors = [(reference_mm / one.length_mm) ** exponent if one.length_mm else 1.0 for one in fruit]
     good, bad = (
@@ -158,13 +142,7 @@ def at_reference(fruit: Sequence[MarkedFruit], exponent: float, reference_mm: fl
 
 
 def errors(good: Values, bad: Values, limits: Values) -> tuple[Counts, Counts]:
-    """Count the good fruit that each limit diverts, and the bad ones that it passes.
-
-    Args:
-        good: least limits by which they pass, mm².
-        bad: likewise.
-        limits: to try, mm².
-    """
+    """Count the good fruit that each limit diverts, and the bad ones that it passes; `good` and `bad` as `choose`."""
     diverted = len(good) - np.searchsorted(np.sort(good), limits, side="right")
     return diverted, np.searchsorted(np.sort(bad), limits, side="right")
 
@@ -175,7 +153,6 @@ def choose(good: Values, bad: Values, costs: Costs) -> float:
     Args:
         good: least limits by which they pass, mm²; at least one of them finite.
         bad: likewise; at least one.
-        costs: of the errors.
     """
     steps = np.unique(np.concatenate([good, bad]))
     steps = steps[np.isfinite(steps)]
@@ -191,11 +168,6 @@ def choose(good: Values, bad: Values, costs: Costs) -> float:
 def cross_validated(good: Values, bad: Values, costs: Costs) -> tuple[int, int] | None:
     """Count errors on fruit that the limit was not chosen on: each is left out once, and judged by the others' limit.
 
-    Args:
-        good: least limits by which they pass, mm².
-        bad: likewise.
-        costs: of the errors.
-
     Returns:
         Good fruit diverted and bad ones passed; None with too few to leave one out.
     """
@@ -207,12 +179,7 @@ def cross_validated(good: Values, bad: Values, costs: Costs) -> tuple[int, int] 
 
 
 def rate_interval(happened: int, number: int) -> Interval:
-    """Return the confidence interval of a rate (Clopper and Pearson, Biometrika 26 (1934) 404).
-
-    Args:
-        happened: number of cases.
-        number: number of trials.
-    """
+    """Return the confidence interval of the rate of cases in trials (Clopper and Pearson, Biometrika 26 (1934) 404)."""
     if not number:
         return Interval(None, None)
     beyond, not_happened = (1 - CONFIDENCE) / 2, number - happened
@@ -222,11 +189,7 @@ def rate_interval(happened: int, number: int) -> Interval:
 
 
 def fewest_fruit(rate: float) -> int:
-    """Return the number of fruit without an error that shows an error rate of at most `rate`.
-
-    Args:
-        rate: above 0 and below 1.
-    """
+    """Return the number of fruit without an error that shows an error rate of at most `rate`, between 0 and 1."""
     return math.ceil(math.log((1 - CONFIDENCE) / 2) / math.log(1 - rate))
 
 

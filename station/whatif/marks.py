@@ -12,10 +12,7 @@ _LARGEST_FILE_BYTES = 50_000_000
 
 
 def read_marks(path: Path) -> dict[int, Mark]:
-    """Read a table with the columns `sequence` and `mark`, the latter `good` or `bad`.
-
-    Args:
-        path: the file; further columns are ignored.
+    """Read a table with the columns `sequence` and `mark`, `good` or `bad`; further columns are ignored.
 
     Raises:
         BadInputError: it cannot be read, lacks a column, marks a fruit twice, or has an invalid word or number.

@@ -82,11 +82,7 @@ def counted(results: Iterable[Replayed]) -> Counted:
 
 
 def as_csv(results: Sequence[Replayed]) -> str:
-    """Return every changed result, as a table.
-
-    Args:
-        results: in the order of the rows.
-    """
+    """Return every changed result, as a table."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(["sequence", "lot", "before", "after", "changes_side", "why"])

@@ -66,14 +66,7 @@ def render(page: Page) -> str:
 def fruit_views(
     connection: Connection, folder: Path, results: Sequence[Replayed], own: Recipe | None, draft: Recipe
 ) -> list[FruitView]:
-    """Read the views of some fruit.
-
-    Args:
-        folder: the records' folder.
-        results: the fruit, in the page's order.
-        own: the inspections' own recipe, for its limits; None if they had several.
-        draft: the recipe that was tried.
-    """
+    """Read the views of some fruit, in the page's order; `own` gives their limits, None if they had several recipes."""
     return [_fruit_view(connection, folder, result, own, draft) for result in results]
 
 
@@ -147,11 +140,6 @@ def _image(folder: Path, sha256: str) -> cv2.typing.MatLike | None:
 
 
 def as_json(counted: Counted, against: Compared | None) -> str:
-    """Return the figures as a file.
-
-    Args:
-        counted: all results.
-        against: of the marked fruit; None if there are none.
-    """
+    """Return the figures of all results, and of the marked fruit, if any, as a file."""
     figures = {**counted.summary(), "marked": None if against is None else against.figures()}
     return json.dumps(figures, indent=2, ensure_ascii=False) + "\n"

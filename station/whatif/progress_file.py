@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from station.errors import BadInputError, StationError
@@ -20,12 +19,7 @@ FILE_NAME = "replayed.jsonl"
 
 
 class ProgressFile:
-    """One draft's results, a line each; the first line identifies the draft. Open it with `with`.
-
-    Args:
-        folder: made if missing.
-        draft: the tried recipe.
-    """
+    """One draft's results, a line each; the first line identifies the draft. Open it with `with`."""
 
     def __init__(self, folder: Path, draft: Recipe) -> None:
         self._path = folder / FILE_NAME
@@ -56,7 +50,7 @@ class ProgressFile:
         whole = content[: content.rfind(b"\n") + 1]  # a line that a crash cut short is done again
         lines = whole.splitlines()
         if lines and _parsed(lines[0]) != self._header:
-            self.__exit__(None, None, None)
+            self.__exit__()
             raise BadInputError(messages.OTHER_DRAFT(folder=str(self._path.parent)))
         os.ftruncate(self._descriptor, len(whole))
         os.lseek(self._descriptor, 0, os.SEEK_END)
@@ -70,9 +64,7 @@ class ProgressFile:
             self._append([self._header])
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close it."""
         os.close(self._descriptor)
 

@@ -60,14 +60,10 @@ class Proposal:
 def proposals(
     stored: Sequence[StoredPress], marked: Mapping[int, Mark], own: Mapping[str, Recipe], recipe: Recipe, costs: Costs
 ) -> list[Proposal]:
-    """Propose a limit for each closing that enough of the fruit reached, the cheapest first.
+    """Propose a limit of a recipe for each closing that enough of the marked fruit reached, the cheapest first.
 
     Args:
-        stored: the marked presses.
-        marked: good or bad, by their sequence.
         own: the recipes that they were pressed by, by their hash.
-        recipe: the limit is proposed for it.
-        costs: of the errors.
     """
     closings = {*recipe.steps.result_closings_mm, *(each.closing_mm for each in recipe.damage.area)}
     found = [_at(closing_mm, stored, marked, own, recipe, costs) for closing_mm in sorted(closings)]
@@ -113,11 +109,7 @@ def _at(
 
 
 def figures_of(proposal: Proposal, costs: Costs) -> dict[str, Any]:
-    """Return a proposal's figures by name.
-
-    Args:
-        costs: that the limit was chosen for.
-    """
+    """Return a proposal's figures by name, with the costs that the limit was chosen for."""
     good, bad, limit = proposal.good, proposal.bad, np.array([proposal.limit_mm2])
     diverted, passed = (int(count[0]) for count in errors(good, bad, limit))
     found = proposal.found_exponent

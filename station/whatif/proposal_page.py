@@ -40,11 +40,7 @@ show();
 
 
 def lines_of(figures: dict[str, Any]) -> list[str]:
-    """Describe a proposal in sentences, for the terminal and the page.
-
-    Args:
-        figures: its figures, by name.
-    """
+    """Describe a proposal, by its figures, in sentences for the terminal and the page."""
     best = figures["proposed"]
     cost, share = figures["false_accept_cost"], figures["damaged_share"]
     costs = f"costs {cost:g} sound ones diverted and {100 * share:g} % are damaged"
@@ -97,11 +93,7 @@ def _times(other: dict[str, Any], best: dict[str, Any]) -> str:
 
 
 def page_of(title: str, best: Proposal, figures: dict[str, Any]) -> str:
-    """Make the page with its two pictures and a slider on the limit, in one file.
-
-    Args:
-        figures: its figures, by name.
-    """
+    """Make the page with the figures, its two pictures and a slider on the limit, in one file."""
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
     curve = figures["proposed"]["curve"]
     chosen = min(range(len(curve)), key=lambda place: abs(curve[place]["limit_mm2"] - best.limit_mm2))

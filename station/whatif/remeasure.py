@@ -32,11 +32,6 @@ def remeasured(stored: StoredPress, own: Segmentation, draft: Segmentation) -> P
     the mean of a step's frames. The disagreement of the frames is known only from the stored confidence: it is a factor
     on the method's own confidence, and is taken over.
 
-    Args:
-        stored: with its images.
-        own: the segmentation of the inspection.
-        draft: the segmentation to try.
-
     Raises:
         CannotRemeasureError: an image is missing or no image, the images do not give the stored areas, or the draft
             would have found the onset at another width.

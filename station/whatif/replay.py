@@ -49,11 +49,7 @@ class Replayed:
 
 
 def recipe_of_snapshot(text: str) -> Recipe | None:
-    """Parse a recipe as it was stored with an inspection; None if this program does not accept it any more.
-
-    Args:
-        text: canonical JSON of any released schema.
-    """
+    """Parse a recipe as stored, of any released schema; None if this program does not accept it any more."""
     values = json.loads(text)
     try:
         upgrade(values)
@@ -89,11 +85,7 @@ def replay(stored: StoredPress, own: Recipe | None, draft: Recipe) -> Replayed:
 
 
 def pressed_otherwise(own: Recipe, draft: Recipe) -> Message | None:
-    """Return why a curve pressed by one recipe is no evidence for the other; None if it is.
-
-    Args:
-        own: the recipe that the fruit was pressed by.
-    """
+    """Return why a curve pressed by one recipe is no evidence for the other; None if it is."""
     pairs = {
         "gripper": (own.gripper, draft.gripper),
         "imaging": (own.imaging, draft.imaging),
@@ -107,11 +99,7 @@ def pressed_otherwise(own: Recipe, draft: Recipe) -> Message | None:
 
 
 def measured_otherwise(own: Recipe, draft: Recipe) -> bool:
-    """Check whether the areas have to be measured again: the method, or one of its parameters, differs.
-
-    Args:
-        own: the recipe that the areas were measured by.
-    """
+    """Check whether the areas have to be measured again: the method, or one of its parameters, differs."""
     before, after = own.segmentation, draft.segmentation
     if before.method != after.method:
         return True
@@ -124,13 +112,7 @@ def measured_otherwise(own: Recipe, draft: Recipe) -> bool:
 def _judged(
     stored: StoredPress, presses: Sequence[tuple[Press, Press]], own: Recipe, draft: Recipe, *, faithful: bool
 ) -> Replayed:
-    """Judge press after press, as often as the draft would have pressed the fruit.
-
-    Args:
-        presses: in order, each as it was measured and as the draft measures it.
-        own: the recipe of the inspection.
-        faithful: as in `Replayed`.
-    """
+    """Judge press after press, each as measured and as the draft measures it, as often as the draft would press."""
     for pressed in range(1, len(presses) + 1):
         then, now = (together(each) for each in zip(*presses[:pressed], strict=True))
         verdict = _judgement(then, now, own, draft)

@@ -53,7 +53,6 @@ def batches(folder: Path, wanted: Sequence[int], own: dict[str, str], draft: Rec
     """Read the inspections to be judged, batch by batch.
 
     Args:
-        folder: the records' folder.
         wanted: the inspections' sequences, ascending.
         own: the stored recipes, canonical JSON by hash.
 
@@ -71,10 +70,9 @@ def batches(folder: Path, wanted: Sequence[int], own: dict[str, str], draft: Rec
 
 
 def run(parts: Iterable[Batch], jobs: int, scheduler: str | None) -> Iterator[list[Replayed]]:
-    """Judge batches, in any order of completion.
+    """Judge batches, read as they are needed, in any order of completion.
 
     Args:
-        parts: read as they are needed.
         jobs: processes on this machine; 1 works in this one.
         scheduler: a Dask scheduler's address, in place of this machine's processes.
 

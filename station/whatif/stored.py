@@ -67,13 +67,7 @@ def sequences(
     last: int | None,
     judged: Sequence[OutcomeName] = ("PASS", "FAIL", "NO_RESULT"),
 ) -> list[int]:
-    """List the judged inspections of a recipe, in order.
-
-    Args:
-        lots: their names; all if empty.
-        last: at most so many, the latest; None for all.
-        judged: with these outcomes.
-    """
+    """List a recipe's inspections with these outcomes, in order: of some lots or all, the `last` at most or all."""
     marks = ", ".join("?" * len(lots))
     chosen = f"AND i.lot IN ({marks})" if lots else ""
     query = (
@@ -91,13 +85,7 @@ def snapshots(connection: Connection, name: str) -> dict[str, str]:
 
 
 def read_stored(connection: Connection, wanted: Sequence[int], folder: Path, *, with_images: bool) -> list[StoredPress]:
-    """Read some inspections with their curves.
-
-    Args:
-        wanted: sequences, ascending, some hundreds at most.
-        folder: the records' folder, for the images.
-        with_images: read the stored images too.
-    """
+    """Read some hundred inspections, in ascending order, with their curves, and also their images if wanted."""
     marks = ", ".join("?" * len(wanted))
     rows = connection.exec_driver_sql(
         "SELECT sequence, lot, judged, reasons, explanation, recipe_sha256, measures, fruit_length_mm_x10, "  # noqa: S608 (marks)

@@ -1,7 +1,7 @@
 """Panel definitions and their conversion for Grafana: each with a unit, a description and a link."""
 
 import itertools
-from collections.abc import Iterator
+import string
 from typing import Any, NamedTuple
 
 from grafana_foundation_sdk.builders import (
@@ -75,12 +75,7 @@ class Panel(NamedTuple):
 def prom(
     kind: str, title: str, unit: str, about: str, link: str, *queries: tuple[str, str] | str, **more: Any
 ) -> Panel:
-    """Make a panel with Prometheus queries.
-
-    Args:
-        queries: expressions, alone or with their legend.
-        more: other fields of `Panel`.
-    """
+    """Make a panel with Prometheus queries, alone or with their legend; `more` are other fields of `Panel`."""
     questions = tuple(Prom(ask) if isinstance(ask, str) else Prom(*ask) for ask in queries)
     return Panel(kind, title, unit, about, link, questions, **more)
 
@@ -95,11 +90,14 @@ def sql(kind: str, title: str, unit: str, about: str, link: str, ask: str, **mor
     return Panel(kind, title, unit, about, link, (Sql(" ".join(ask.split())),), **more)
 
 
-class _SqlQuery(Dataquery):
-    """PostgreSQL query as Grafana 11 writes it; the SDK has no model of it."""
+class _SqlQuery(Dataquery, Builder[Dataquery]):
+    """PostgreSQL query as Grafana 11 writes it, and its own builder; the SDK has no model of it."""
 
     def __init__(self, ref_id: str, text: str, *, over_time: bool) -> None:
         self._ref_id, self._text, self._over_time = ref_id, text, over_time
+
+    def build(self) -> Dataquery:
+        return self
 
     def to_json(self) -> dict[str, object]:
         return {
@@ -112,20 +110,8 @@ class _SqlQuery(Dataquery):
         }
 
 
-class _SqlBuilder(Builder[Dataquery]):
-    def __init__(self, query: _SqlQuery) -> None:
-        self._query = query
-
-    def build(self) -> Dataquery:
-        return self._query
-
-
 def built(panel: Panel, number: int) -> Any:
-    """Return the panel for Grafana.
-
-    Args:
-        number: unique on the dashboard.
-    """
+    """Return the panel for Grafana, by a number that is unique on the dashboard."""
     making = _MAKERS[panel.kind](panel)
     source = PROMETHEUS if isinstance(panel.queries[0], Prom) else POSTGRESQL
     link = dashboard.DashboardLink("What to do").type(DashboardLinkType.LINK).url(f"{DOCS}/{panel.link}")
@@ -133,7 +119,7 @@ def built(panel: Panel, number: int) -> Any:
         making.id(number).title(panel.title).description(panel.about).unit(panel.unit).datasource(source)
         .links([link.target_blank(target_blank=True)]).span(panel.width).height(4 if panel.kind == "number" else HEIGHT)
     )  # fmt: skip
-    for letter, ask in zip(_letters(), panel.queries, strict=False):
+    for letter, ask in zip(string.ascii_uppercase, panel.queries, strict=False):
         making = making.with_target(_with_query(panel, letter, ask))
     return making
 
@@ -184,13 +170,9 @@ def chosen(name: str, label: str, query: str, *, several: bool) -> Any:
     return making.current(VariableOption(selected=True, text="All", value="$__all")) if several else making
 
 
-def _letters() -> Iterator[str]:
-    return (chr(number) for number in itertools.count(ord("A")))
-
-
 def _with_query(panel: Panel, letter: str, ask: Prom | Sql) -> Builder[Any]:
     if isinstance(ask, Sql):
-        return _SqlBuilder(_SqlQuery(letter, ask.sql, over_time=panel.kind not in {"table", "number"}))
+        return _SqlQuery(letter, ask.sql, over_time=panel.kind not in {"table", "number"})
     query = prometheus.Dataquery().expr(ask.expr).ref_id(letter).datasource(PROMETHEUS)
     if panel.kind == "heat":
         return query.range().format(PromQueryFormat.HEATMAP).legend_format("{{le}}")

@@ -9,11 +9,7 @@ LASTED = "station_inspection_duration_seconds"
 
 
 def mean_of(phases: str) -> str:
-    """Return an expression: seconds in these phases of the cycle, per inspection.
-
-    Args:
-        phases: a regular expression.
-    """
+    """Return an expression: seconds in the phases of the cycle that a regular expression names, per inspection."""
     took = f'rate(station_phase_duration_seconds_sum{{{HERE}, phase=~"{phases}"}}[$__rate_interval])'
     number = f"sum(rate({LASTED}_count{{{HERE}}}[$__rate_interval]))"
     return f"sum by (phase) ({took}) / ignoring (phase) group_left {number}"

@@ -68,10 +68,7 @@ def no_heartbeat(node: Node, settings: CanSettings) -> Message:
 
 
 def verify_identity(node: Node) -> str:
-    """Read a node's identity and compare it with the data sheet.
-
-    Returns:
-        Product and revision as text.
+    """Compare a node's identity with the data sheet, and return product and revision as text.
 
     Raises:
         BringUpError: it is another device, or does not answer.

@@ -2,20 +2,18 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 
 import click
 
 from plc_interface.outputs.can import bring_up
 from plc_interface.outputs.can.errors import BringUpError, LineIoError
-from plc_interface.outputs.can.link import CanLink, described
+from plc_interface.outputs.can.link import STATES, CanLink, described
 from station.messages.message import Message
 from station.settings.can import CanSettings
 from station.settings.configuration import load_configuration
 
 _NODE_DEADLINE_S = 3.0
-_STATES = {0: "booting", 4: "stopped", 5: "operational", 127: "pre-operational"}
 _POLL_S = 0.02
 
 
@@ -37,9 +35,8 @@ def check_can(config: Path | None) -> None:
     try:
         click.echo(f"{click.style('ok      ', fg='green')}{described(settings)}")
         for node in (bring_up.make_gate(link.network, settings), bring_up.make_encoder(link.network, settings)):
-            looked = _check_gate if node.number == settings.gate_node else _check_encoder
             try:
-                found = looked(link, node, settings)
+                found = _check_node(link, node, settings)
             except LineIoError as error:
                 faulty.append(node.name)
                 click.echo(f"{click.style('fault   ', fg='red')}{error}")
@@ -51,21 +48,8 @@ def check_can(config: Path | None) -> None:
         raise LineIoError(f"not usable: {', '.join(map(str, faulty))}")
 
 
-def _check_gate(link: CanLink, node: bring_up.Node, settings: CanSettings) -> str:
-    return _check_node(link, node, settings, bring_up.gate_pdos)
-
-
-def _check_encoder(link: CanLink, node: bring_up.Node, settings: CanSettings) -> str:
-    return f"{_check_node(link, node, settings, bring_up.encoder_pdos)}, count {bring_up.read_position(node)}"
-
-
-def _check_node(
-    link: CanLink,
-    node: bring_up.Node,
-    settings: CanSettings,
-    pdos: Callable[[bring_up.Node, CanSettings], dict[str, bring_up.Pdo]],
-) -> str:
-    """Return heartbeat, identity and mapping as text.
+def _check_node(link: CanLink, node: bring_up.Node, settings: CanSettings) -> str:
+    """Return identity, heartbeat and mapping as text, and the encoder's count.
 
     Raises:
         LineIoError: no heartbeat, another device, or no answer.
@@ -77,9 +61,11 @@ def _check_node(
             raise BringUpError(bring_up.no_heartbeat(node, settings))
         time.sleep(_POLL_S)
     identity = bring_up.verify_identity(node)
-    foreign = bring_up.foreign_mapping(node, pdos(node, settings))
+    is_gate = node.number == settings.gate_node
+    foreign = bring_up.foreign_mapping(node, (bring_up.gate_pdos if is_gate else bring_up.encoder_pdos)(node, settings))
     mapping = (
         "another mapping, which the station writes at its start" if foreign else "mapping as the station writes it"
     )
     state = link.beats[node.number].state
-    return f"{identity}, heartbeat {_STATES.get(state, f'in state {state}')}, {mapping}"
+    count = "" if is_gate else f", count {bring_up.read_position(node)}"
+    return f"{identity}, heartbeat {STATES.get(state, f'in state {state}')}, {mapping}{count}"

@@ -14,20 +14,10 @@ class Count(NamedTuple):
 
 
 def further(count: int, by: int) -> int:
-    """Add counts, modulo 2**32.
-
-    Args:
-        count: 0 to 2**32 - 1.
-        by: counts, may be negative.
-    """
+    """Add counts, which may be negative, to one of 0 to 2**32 - 1, modulo 2**32."""
     return (count + by) % RANGE
 
 
 def ahead(of: int, count: int) -> int:
-    """Return the distance between two counts, -2**31 to 2**31 - 1; at 3000 counts/s half the range takes eight days.
-
-    Args:
-        of: the belt's count.
-        count: the target.
-    """
+    """Return how far a count is ahead `of` the belt's, -2**31 to 2**31 - 1: at 3000 counts/s half takes eight days."""
     return (count - of + RANGE // 2) % RANGE - RANGE // 2

@@ -37,11 +37,7 @@ def is_reset(code: int) -> bool:
 
 
 def described_emergency(node: Message, code: int, register: int) -> Message:
-    """Describe an emergency, with the remedy.
-
-    Args:
-        register: the error register, object 0x1001.
-    """
+    """Describe an emergency by its code and error register (object 0x1001), with the remedy."""
     what, remedy = _NAMES.get(code, (_CLASSES.get(code & 0xF000, messages.UNKNOWN), messages.DO_MANUAL))
     return messages.EMERGENCY(
         node=node, what=what(), code=f"0x{code:04X}", register=f"0x{register:02X}", remedy=remedy()

@@ -27,7 +27,7 @@ from plc_interface.outputs.can.errors import (
     RejectError,
     RejectRefusedError,
 )
-from plc_interface.outputs.can.link import HEARTBEAT, ORDER, CanLink, Emergency, Report
+from plc_interface.outputs.can.link import HEARTBEAT, ORDER, STATES, CanLink, Emergency, Report
 from plc_interface.outputs.can.pending_rejects import DivertEcho, Fired, Order, PendingReject, PendingRejects
 from station.messages import can as messages
 from station.messages.message import Message
@@ -37,8 +37,7 @@ _LONGEST_PAUSE_S = 10.0
 _POLL_S = 0.02
 _NODE_DEADLINE_S = 3.0
 _LANES = 8
-_OPERATIONAL, _PRE_OPERATIONAL, _STOPPED = 5, 127, 4
-_STATES = {0: "booting", _STOPPED: "stopped", _OPERATIONAL: "operational", _PRE_OPERATIONAL: "pre-operational"}
+_OPERATIONAL, _PRE_OPERATIONAL = 5, 127
 
 Result = TypeVar("Result")
 log = logging.getLogger(__name__)
@@ -137,11 +136,7 @@ class LineIo:
         return Count(value, age_s) if age_s <= self._settings.count_stale_s else None
 
     def count_at_gate(self, count_at_nest: int) -> int:
-        """Return the count at which a fruit reaches the gate.
-
-        Args:
-            count_at_nest: the encoder's count when the fruit was at the nest.
-        """
+        """Return the count at which a fruit reaches the gate, from that when it was at the nest."""
         return further(count_at_nest, self._settings.distance_counts)
 
     async def divert(self, sequence: int, lane: int, at_count: int) -> DivertEcho:
@@ -312,8 +307,7 @@ class LineIo:
             beat = link.beats[node.number]
             return beat.state == state and beat.at_s > sent_s
 
-        why = messages.STATE_REFUSED(node=node.name, state=_STATES[state])
-        await self._until(link, obeyed, why)
+        await self._until(link, obeyed, messages.STATE_REFUSED(node=node.name, state=STATES[state]))
 
     def _alive(self, link: CanLink, node: int) -> bool:
         beat = link.beats.get(node)
@@ -337,7 +331,7 @@ class LineIo:
                     raise NodeLostError(messages.SILENT(node=self._name(node)))
                 state = link.beats[node].state
                 if state != _OPERATIONAL:
-                    told = _STATES.get(state, str(state))
+                    told = STATES.get(state, str(state))
                     raise NodeLostError(messages.STATE_CHANGED(node=self._name(node), state=told))
             await asyncio.sleep(_POLL_S)
         raise _HealthEndedError(messages.UNHEALTHY())

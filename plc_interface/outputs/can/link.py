@@ -52,6 +52,9 @@ class Beat(NamedTuple):
     """Monotonic."""
 
 
+STATES = {0: "booting", 4: "stopped", 5: "operational", 127: "pre-operational"}
+
+
 class Report(NamedTuple):
     """The gate's report of a reject actuation."""
 
@@ -120,8 +123,7 @@ class CanLink:
 
         Args:
             counters: receptions are counted here, by the receiving thread alone.
-            on_report: called by the receiving thread.
-            on_emergency: called by the receiving thread.
+            on_report, on_emergency: called by the receiving thread.
 
         Raises:
             InterfaceError: the interface cannot be opened.
@@ -155,11 +157,7 @@ class CanLink:
             raise InterfaceError(messages.DEAF(bus=described(self._settings)))
 
     def send(self, can_id: int, data: bytes) -> None:
-        """Send one frame.
-
-        Args:
-            can_id: 11 bits.
-            data: at most 8 bytes.
+        """Send one frame, with an identifier of 11 bits and at most 8 bytes.
 
         Raises:
             InterfaceError: the bus is closed or does not accept it.

@@ -9,9 +9,9 @@ station's `modbus.word_order` has to be `low_first`.
 import re
 from xml.etree import ElementTree as ET
 
-from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
 from plc_interface.registers.generate.st_source import Variable, parts
 from plc_interface.registers.generate.structured_text import ARRAYS, data_types, function_block
+from plc_interface.registers.generate.structures import document, logix_root
 
 NAME = "FB_FruitStation"
 _DIRECTION = {"VAR_INPUT": "Input", "VAR_OUTPUT": "Output"}
@@ -23,16 +23,7 @@ _CALLS = re.compile(r"\b(?:[A-Z]+_TO_[A-Z]+)\(((?:[^()]|\([^()]*\))*)\)")
 def add_on_instruction() -> str:
     """The file `add-on-instruction.L5X`."""
     source = parts(function_block())
-    root = ET.Element(
-        "RSLogix5000Content",
-        SchemaRevision="1.0",
-        SoftwareRevision="32.00",
-        TargetName=NAME,
-        TargetType="AddOnInstructionDefinition",
-        ContainsContext="true",
-        ExportOptions="References NoRawData L5KData DecoratedData Context Dependencies",
-    )
-    controller = ET.SubElement(root, "Controller", Use="Context", Name="Controller")
+    root, controller = logix_root(NAME, "AddOnInstructionDefinition")
     _data_types(ET.SubElement(controller, "DataTypes", Use="Context"))
     definitions = ET.SubElement(controller, "AddOnInstructionDefinitions", Use="Context")
     definition = ET.SubElement(
@@ -66,9 +57,7 @@ def add_on_instruction() -> str:
     content = ET.SubElement(ET.SubElement(routines, "Routine", Name="Logic", Type="ST"), "STContent")
     for number, line in enumerate(_logic(source.body, variables, constants).splitlines()):
         ET.SubElement(content, "Line", Number=str(number)).text = line
-    ET.indent(root)
-    body = ET.tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n<!-- {MADE_BY.replace("`", "")} {UNTESTED} -->\n{body}\n'
+    return document(root)
 
 
 def _kind(variable: Variable) -> str:

@@ -35,10 +35,7 @@ def made_files() -> dict[str, str]:
 
 
 def write_files(folder: Path) -> list[Path]:
-    """Write all files; return those that are new or were different.
-
-    Args:
-        folder: created if it is missing.
+    """Write all files into a folder, created if it is missing; return those that are new or were different.
 
     Raises:
         BadInputError: the folder cannot be written, or does not exist in an installation without the repository.

@@ -8,21 +8,11 @@ import json
 from typing import Any
 
 from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
+from plc_interface.registers.generate.type_names import NAMES
 from plc_interface.registers.map import GROUPS
 from plc_interface.registers.register import Kind, Register
 
 DEVICE = "FruitStation"
-DESIGNATORS = {
-    Kind.U16: ("HRUS", "Int4"),
-    Kind.BITS: ("HRUS", "Int4"),
-    Kind.I16: ("HR", "Int2"),
-    Kind.U32: ("HRUI", "Int8"),
-    Kind.BITS32: ("HRUI", "Int8"),
-    Kind.I32: ("HRI", "Int4"),
-    Kind.U64: ("HRUI_64", "Int8"),
-    Kind.F32: ("HRF", "Float4"),
-    Kind.TEXT: ("HRS", "String"),
-}
 
 
 def ignition() -> str:
@@ -41,7 +31,7 @@ def ignition() -> str:
 
 
 def _tag(register: Register) -> dict[str, Any]:
-    designator, data_type = DESIGNATORS[register.kind]
+    designator, data_type = NAMES[register.kind].ignition
     length = f":{2 * register.words}" if register.kind is Kind.TEXT else ""
     return {
         "name": register.name,

@@ -6,21 +6,15 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from plc_interface.registers.alarms import ALARMS
-from plc_interface.registers.bits import COMMAND_CODES, OUTCOME_CODES, WRITE_KEY
+from plc_interface.registers.bits import WRITE_KEY
 from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
+from plc_interface.registers.generate.type_names import NAMES, meaning_and_unit
 from plc_interface.registers.map import BY_NAME, GROUP_BY_NAME, MAP_VERSION, map_checksum
 from plc_interface.registers.register import Kind, Register
 
 STATUS, RESULT, CONTROL = GROUP_BY_NAME["status"], GROUP_BY_NAME["result"], GROUP_BY_NAME["control"]
 MORE_STATUS = GROUP_BY_NAME["more_status"]
-_TYPES = {
-    Kind.U16: "UINT",
-    Kind.I16: "INT",
-    Kind.U32: "UDINT",
-    Kind.I32: "DINT",
-    Kind.BITS: "WORD",
-    Kind.BITS32: "DWORD",
-}
+_NUMBERS = frozenset({Kind.U16, Kind.I16, Kind.U32, Kind.I32, Kind.BITS, Kind.BITS32})
 ARRAYS = {
     "T_FruitStationRead": MORE_STATUS.address + MORE_STATUS.words - STATUS.address,
     "T_FruitStationWrite": CONTROL.words,
@@ -46,13 +40,13 @@ def bit_fields(register: Register) -> list[tuple[str, int, str]]:
 def members(registers: tuple[Register, ...]) -> Iterator[tuple[str, str, str]]:
     """Return name, type and comment of each member, without floats: the hundredths hold the same value."""
     for register in registers:
-        comment = (register.meaning + (f", {register.unit}" if register.unit else "")).replace("²", "2")
+        comment = meaning_and_unit(register).replace("²", "2")
         name = field_name(register)
         if register.kind is Kind.U64:
             yield f"{name}_high", "UDINT", f"{comment}, upper half"
             yield f"{name}_low", "UDINT", f"{comment}, lower half"
-        elif register.kind in _TYPES:
-            yield name, _TYPES[register.kind], comment
+        elif register.kind in _NUMBERS:
+            yield name, NAMES[register.kind].iec, comment
         for flag, _, meaning in bit_fields(register):
             yield flag, "BOOL", meaning
 
@@ -109,8 +103,8 @@ def _render(template: str, what: str) -> str:
         writes=CONTROL.words,
         lot_words=BY_NAME["lot"].words,
         control_bits=BY_NAME["control"].bits,
-        change_recipe=next(number for number, code in COMMAND_CODES.items() if code.name == "change_recipe"),
-        outcome_pass=next(number for number, code in OUTCOME_CODES.items() if code.name == "PASS"),
+        change_recipe=BY_NAME["command_code"].code("change_recipe"),
+        outcome_pass=BY_NAME["result_outcome"].code("PASS"),
         write_key=WRITE_KEY,
         decoding=list(_decoding()),
         at=lambda name: BY_NAME[name].address - STATUS.address,
@@ -129,12 +123,12 @@ def _decode(register: Register, variable: str) -> Iterator[str]:
     target, place = f"{variable}.{field_name(register)}", register.address - STATUS.address
     match register.kind:
         case Kind.U16 | Kind.I16:
-            yield f"{target} := WORD_TO_{_TYPES[register.kind]}(station[{place}]);"
+            yield f"{target} := WORD_TO_{NAMES[register.kind].iec}(station[{place}]);"
         case Kind.BITS:
             yield f"{target} := station[{place}];"
         case Kind.U32 | Kind.I32:
             yield f"words := {_join(f'{place} + one', f'{place + 1} - one')};"
-            yield f"{target} := DWORD_TO_{_TYPES[register.kind]}(words);"
+            yield f"{target} := DWORD_TO_{NAMES[register.kind].iec}(words);"
         case Kind.BITS32:
             yield f"{target} := {_join(f'{place} + one', f'{place + 1} - one')};"
         case Kind.U64:

@@ -6,35 +6,12 @@ first, because its numbers are aligned in each block. Texts then have their char
 
 from xml.etree import ElementTree as ET
 
-from plc_interface.registers.alarms import ALARMS
 from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
+from plc_interface.registers.generate.type_names import NAMES, flags, meaning_and_unit
 from plc_interface.registers.map import GROUPS
 from plc_interface.registers.register import Kind, Register
 
 LOW_FIRST = "Set the station to the low word first, read the block's registers and copy them onto it byte by byte."
-LOGIX = {
-    Kind.U16: "INT",
-    Kind.BITS: "INT",
-    Kind.I16: "INT",
-    Kind.TEXT: "INT",
-    Kind.U32: "DINT",
-    Kind.BITS32: "DINT",
-    Kind.I32: "DINT",
-    Kind.U64: "LINT",
-    Kind.F32: "REAL",
-}
-"""Logix numbers are signed: an unsigned one over half its range reads as negative."""
-CODESYS = {
-    Kind.U16: "UINT",
-    Kind.BITS: "WORD",
-    Kind.I16: "INT",
-    Kind.TEXT: "WORD",
-    Kind.U32: "UDINT",
-    Kind.BITS32: "DWORD",
-    Kind.I32: "DINT",
-    Kind.U64: "ULINT",
-    Kind.F32: "REAL",
-}
 PLCOPEN = "http://www.plcopen.org/xml/tc6_0200"
 XHTML = "http://www.w3.org/1999/xhtml"
 _WHEN = "2026-01-01T00:00:00"
@@ -43,27 +20,18 @@ _WHEN = "2026-01-01T00:00:00"
 
 def studio_5000() -> str:
     """The file `studio-5000.L5X`: a data type for each block and one that holds them all."""
-    root = ET.Element(
-        "RSLogix5000Content",
-        SchemaRevision="1.0",
-        SoftwareRevision="32.00",
-        TargetName="FruitStation",
-        TargetType="DataType",
-        ContainsContext="true",
-        ExportOptions="References NoRawData L5KData DecoratedData Context Dependencies",
-    )
-    controller = ET.SubElement(root, "Controller", Use="Context", Name="Controller")
+    root, controller = logix_root("FruitStation", "DataType")
     types = ET.SubElement(controller, "DataTypes", Use="Context")
     for group in GROUPS:
         listed = _logix_type(types, f"FruitStation_{group.name}", f"{group.title}. {LOW_FIRST}")
         for register in group.registers:
             dimension = register.words if register.kind is Kind.TEXT else 0
-            _logix_member(listed, register.name, LOGIX[register.kind], dimension, _comment(register))
+            _logix_member(listed, register.name, NAMES[register.kind].logix, dimension, _comment(register))
     whole = _logix_type(types, "FruitStation", "The fruit-inspection station's registers", Use="Target")
     for group in GROUPS:
         about = f"Registers {group.address} to {group.address + group.words - 1}"
         _logix_member(whole, group.name, f"FruitStation_{group.name}", 0, about)
-    return _document(root)
+    return document(root)
 
 
 def codesys() -> str:
@@ -91,12 +59,26 @@ def codesys() -> str:
                 array = ET.SubElement(kind, _tag("array"))
                 ET.SubElement(array, _tag("dimension"), lower="0", upper=str(register.words - 1))
                 kind = ET.SubElement(array, _tag("baseType"))
-            ET.SubElement(kind, _tag(CODESYS[register.kind]))
+            ET.SubElement(kind, _tag(NAMES[register.kind].iec))
             _documentation(variable, _comment(register))
         _documentation(data_type, f"{group.title}: registers {group.address} to "
                                   f"{group.address + group.words - 1}. {LOW_FIRST}")  # fmt: skip
     ET.SubElement(ET.SubElement(root, _tag("instances")), _tag("configurations"))
-    return _document(root)
+    return document(root)
+
+
+def logix_root(name: str, kind: str) -> tuple[ET.Element, ET.Element]:
+    """Return the root of an L5X file that holds one target of a type, and its controller."""
+    root = ET.Element(
+        "RSLogix5000Content",
+        SchemaRevision="1.0",
+        SoftwareRevision="32.00",
+        TargetName=name,
+        TargetType=kind,
+        ContainsContext="true",
+        ExportOptions="References NoRawData L5KData DecoratedData Context Dependencies",
+    )
+    return root, ET.SubElement(root, "Controller", Use="Context", Name="Controller")
 
 
 def _logix_type(types: ET.Element, name: str, description: str, **attributes: str) -> ET.Element:
@@ -106,8 +88,7 @@ def _logix_type(types: ET.Element, name: str, description: str, **attributes: st
 
 
 def _logix_member(members: ET.Element, name: str, data_type: str, dimension: int, description: str) -> None:
-    plain = data_type in LOGIX.values()
-    radix = "NullType" if not plain else "Float" if data_type == "REAL" else "Decimal"
+    radix = "NullType" if data_type.startswith("FruitStation") else "Float" if data_type == "REAL" else "Decimal"
     member = ET.SubElement(
         members, "Member", Name=name, DataType=data_type, Dimension=str(dimension), Radix=radix, Hidden="false",
         ExternalAccess="Read/Write",
@@ -120,17 +101,16 @@ def _documentation(parent: ET.Element, text: str) -> None:
 
 
 def _comment(register: Register) -> str:
-    comment = register.meaning + (f", {register.unit}" if register.unit else "")
-    if register.bits and register not in ALARMS:
-        comment += "; bits: " + ", ".join(f"{bit.number} {bit.name}" for bit in register.bits)
-    return comment
+    bits = flags(register)
+    return meaning_and_unit(register) + (f"; bits: {bits}" if bits else "")
 
 
 def _tag(name: str) -> str:
     return f"{{{PLCOPEN}}}{name}"
 
 
-def _document(root: ET.Element) -> str:
+def document(root: ET.Element) -> str:
+    """Return an XML file, with the notices that it is generated and untested."""
     ET.indent(root)
     body = ET.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n<!-- {MADE_BY.replace("`", "")} {UNTESTED} -->\n{body}\n'

@@ -4,20 +4,9 @@ Telegraf's documentation, "Modbus Input Plugin", configuration type `request`.
 """
 
 from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
+from plc_interface.registers.generate.type_names import NAMES
 from plc_interface.registers.map import GROUPS
 from plc_interface.registers.register import Kind
-
-TYPES = {
-    Kind.U16: "UINT16",
-    Kind.BITS: "UINT16",
-    Kind.I16: "INT16",
-    Kind.U32: "UINT32",
-    Kind.BITS32: "UINT32",
-    Kind.I32: "INT32",
-    Kind.U64: "UINT64",
-    Kind.F32: "FLOAT32",
-    Kind.TEXT: "STRING",
-}
 
 
 def telegraf() -> str:
@@ -48,7 +37,7 @@ def telegraf() -> str:
             length = f", length = {register.words}" if register.kind is Kind.TEXT else ""
             lines.append(
                 f'      {{ address = {register.address}, name = "{register.name}", '
-                f'type = "{TYPES[register.kind]}"{length} }},'
+                f'type = "{NAMES[register.kind].telegraf}"{length} }},'
             )
         lines.append("    ]")
     texts = [register.name for group in GROUPS[1:] for register in group.registers if register.kind is Kind.TEXT]

@@ -7,20 +7,10 @@ numbers become two, because the S7-1200 has none.
 
 from collections.abc import Iterator
 
-from plc_interface.registers.alarms import ALARMS
 from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
+from plc_interface.registers.generate.type_names import NAMES, flags, meaning_and_unit
 from plc_interface.registers.map import GROUPS
 from plc_interface.registers.register import Kind, Register
-
-TYPES = {
-    Kind.U16: "UInt",
-    Kind.BITS: "Word",
-    Kind.I16: "Int",
-    Kind.U32: "UDInt",
-    Kind.BITS32: "DWord",
-    Kind.I32: "DInt",
-    Kind.F32: "Real",
-}
 
 
 def tia() -> str:
@@ -52,9 +42,9 @@ def tia() -> str:
 
 
 def _rows(register: Register) -> Iterator[str]:
-    comment = register.meaning + (f", {register.unit}" if register.unit else "")
-    if register.bits and register not in ALARMS:
-        comment += "; " + ", ".join(f"X{bit.number} {bit.name}" for bit in register.bits)
+    comment = meaning_and_unit(register)
+    if bits := flags(register, "X"):
+        comment += f"; {bits}"
     match register.kind:
         case Kind.U64:
             yield f'"{register.name}_high" : UDInt;   // {comment}, upper half'
@@ -62,4 +52,4 @@ def _rows(register: Register) -> Iterator[str]:
         case Kind.TEXT:
             yield f'"{register.name}" : Array[0..{2 * register.words - 1}] of Char;   // {comment}'
         case _:
-            yield f'"{register.name}" : {TYPES[register.kind]};   // {comment}'
+            yield f'"{register.name}" : {NAMES[register.kind].siemens};   // {comment}'

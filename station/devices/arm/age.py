@@ -18,12 +18,7 @@ class TimestampAge:
         self._lows: deque[tuple[float, float]] = deque()
 
     def age_s(self, timestamp_s: float, now_s: float) -> float:
-        """Return the age of a state.
-
-        Args:
-            timestamp_s: the latest timestamp, on the sender's clock.
-            now_s: the time on our own clock, which does not go back.
-        """
+        """Return the age of a state by its timestamp, on the sender's clock, and by our own, which never goes back."""
         difference = now_s - timestamp_s
         while self._lows and self._lows[-1][1] >= difference:
             self._lows.pop()

@@ -38,11 +38,7 @@ class Arm(Protocol):
         ...
 
     def renew_health(self, lease_s: float) -> None:
-        """Renew the health lease; when it runs out, the controller stops the arm.
-
-        Args:
-            lease_s: seconds from now.
-        """
+        """Renew the health lease, in seconds from now; when it runs out, the controller stops the arm."""
         ...
 
     async def move_to(self, pose: PoseName) -> None:
@@ -54,10 +50,7 @@ class Arm(Protocol):
         ...
 
     async def move_beside_nest(self, offset_mm: tuple[float, float, float]) -> None:
-        """Move straight to the nest plus an offset, and return when it is reached. A cancelled move is stopped.
-
-        Args:
-            offset_mm: from the nest, along the tool's own x, y and z.
+        """Move straight to the nest plus an offset along the tool's own x, y and z, as `move_to`.
 
         Raises:
             ArmFault: the arm is not ready, may not move there, or was stopped on the way.

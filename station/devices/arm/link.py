@@ -318,11 +318,7 @@ class ArmLink:
         return diagnose(snapshot, facts, output, was_healthy=self._was_healthy and not snapshot.kicks_late)
 
     async def explain(self, output: Message | None) -> ArmFault:
-        """Return the cause why a command was not done; it becomes the link's fault.
-
-        Args:
-            output: of the command; None if it gave none.
-        """
+        """Return why a command was not done, with its output if it gave one; it becomes the link's fault."""
         async with self._lock:
             try:
                 fault = await self._explain(output)

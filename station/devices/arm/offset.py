@@ -6,12 +6,7 @@ from station.devices.arm.messages import Position, Six
 
 
 def offset_pose(pose: Six, offset_mm: Position) -> Six:
-    """Return the pose with an offset along its own axes, with the same orientation.
-
-    Args:
-        pose: x, y, z in m and the rotation vector in rad.
-        offset_mm: along the tool's x, y and z.
-    """
+    """Return a pose (m, rotation vector in rad) with an offset along its own x, y and z, with the same orientation."""
     x, y, z, *vector = pose
     angle = hypot(*vector)
     offset = [value / 1000 for value in offset_mm]

@@ -35,10 +35,6 @@ class ArmProcess:
     async def spawn(cls, host: str, frequency_hz: float) -> Self:
         """Start the process; it is not connected to anything yet.
 
-        Args:
-            host: the controller's address.
-            frequency_hz: rate of the controller's state.
-
         Raises:
             ArmFault: no process can be started.
         """

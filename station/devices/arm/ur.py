@@ -114,10 +114,7 @@ class UrArm:
             await self._go(target, where, self._settings.reached_tolerance_rad, straight=straight)
 
     async def move_beside_nest(self, offset_mm: Position) -> None:
-        """Move straight to the nest plus an offset, and return when it is reached.
-
-        Args:
-            offset_mm: from the nest, along the tool's own x, y and z; no longer than the settings allow.
+        """Move straight to the nest plus an offset along the tool's axes, at most as long as the settings allow.
 
         Raises:
             ArmFault: the arm is not ready, may not move there, was stopped, or did not arrive.
@@ -140,11 +137,7 @@ class UrArm:
             await self._go(found.joints_rad, where, BESIDE_WITHIN_RAD, straight=True)
 
     async def stop(self) -> None:
-        """Brake to rest, and end a `move_to` that is under way.
-
-        Raises:
-            ArmFault: the controller does not confirm; its watchdog then stops the arm.
-        """
+        """See `Arm.stop`; a `move_to` that is under way ends."""
         self._stopped.set()
         if self._link.fault is None:
             await self._brake()

@@ -93,23 +93,12 @@ def packed_leds(leds: Leds) -> int:
 
 
 def to_portrait(image: Image) -> Image:
-    """Rotate the sensor's landscape picture to the station's: transposed, then flipped upside down.
-
-    Args:
-        image: shape (480, 640, 3), dtype uint8.
-
-    Returns:
-        Shape (640, 480, 3).
-    """
+    """Rotate a picture of shape (480, 640, 3), dtype uint8, to (640, 480, 3): transposed, then flipped upside down."""
     return np.asarray(cv2.flip(cv2.transpose(image), 0), np.uint8)
 
 
 def set_mode(capture: Capture, serial: str) -> None:
-    """Set VGA at 30 frames/s in YUYV and check the mode that the camera gives.
-
-    Args:
-        capture: an open capture.
-        serial: for the message.
+    """Set VGA at 30 frames/s in YUYV on an open capture, and check the mode that the camera gives.
 
     Raises:
         CameraError: another mode was given.
@@ -145,10 +134,6 @@ class DigitCamera:
     """Driver `digit`: a thread reads frame after frame, so that the kernel's buffer never has an old one.
 
     A lost sensor is searched by its serial number until the camera is closed.
-
-    Args:
-        sysfs: folder that lists the sensors.
-        opener: opens a node.
     """
 
     def __init__(
@@ -192,11 +177,7 @@ class DigitCamera:
             raise NoCameraError(messages.NO_FIRST_FRAME(camera=self._name, limit_s=limit_s, reason=reason)) from error
 
     async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
-        """See `Camera.frame`.
-
-        Raises:
-            NoFrameError: no such frame came in time.
-        """
+        """See `Camera.frame`."""
         return await self._feed.newer(newer_than_s, deadline_s)
 
     async def set_leds(self, leds: Leds) -> None:

@@ -10,12 +10,7 @@ from station.messages.message import Message
 
 
 class FrameFeed:
-    """Newest frame of one camera, checked only when it is taken.
-
-    Args:
-        name: the camera's, for messages.
-        remedy: for the message if no frame comes; None for cable and light.
-    """
+    """Newest frame of one camera, checked only when it is taken; without a `remedy` messages name cable and light."""
 
     def __init__(self, name: Message, health: FrameHealth, remedy: Message | None = None) -> None:
         self._name, self._health, self._remedy = name, health, remedy or messages.REMEDY_CABLE()
@@ -47,10 +42,7 @@ class FrameFeed:
         self._changed.set()
 
     async def newer(self, newer_than_s: float, deadline_s: float) -> Frame:
-        """Return the newest frame, once there is one captured after a time.
-
-        Args:
-            newer_than_s: monotonic time.
+        """Return the newest frame, once there is one captured after a monotonic time.
 
         Raises:
             NoFrameError: none came in time.

@@ -20,14 +20,10 @@ _FITS_BETTER = 0.85
 
 
 class FrameHealth:
-    """Checks one camera's frames in their order.
+    """Checks one camera's frames, of a shape (rows, columns), in their order; older than `oldest_s` they are stale.
 
     A seam is a line across the whole image with a step along all of it; nothing pressed into a gel makes one. With the
     image rolled back to the seam it either fits the light of the frame before (shifted) or not (torn).
-
-    Args:
-        oldest_s: age beyond which a frame is stale.
-        shape: rows and columns that a frame must have.
     """
 
     def __init__(self, oldest_s: float, shape: tuple[int, int]) -> None:

@@ -123,13 +123,9 @@ class Camera(Protocol):
         ...
 
     async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
-        """Return the first available frame captured after a time.
+        """Return the first available frame captured after a monotonic time.
 
         A frame with faults is returned too: the caller decides whether to try again.
-
-        Args:
-            newer_than_s: monotonic time that the capture must come after.
-            deadline_s: longest wait, in seconds.
 
         Raises:
             NoFrameError: no such frame came in time; also while the camera is lost and being searched.

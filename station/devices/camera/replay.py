@@ -64,10 +64,7 @@ class ReplayCamera:
             self._playing = asyncio.create_task(self._play(1.0 / self._settings.replay.frames_per_s), name="replay")
 
     async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
-        """See `Camera.frame`; without a rate each call after the first gives the recording's next frame.
-
-        Args:
-            newer_than_s: monotonic time that the capture must come after; ignored without a rate.
+        """See `Camera.frame`; without a rate each call after the first gives the next frame, whatever `newer_than_s`.
 
         Raises:
             NoFrameError: no such frame came in time, or the recording has ended.
@@ -117,10 +114,7 @@ class ReplayCamera:
 
 
 def read_frames(source: Path) -> Iterator[tuple[str, Image]]:
-    """Yield the frames of a recording with their names, read one by one.
-
-    Args:
-        source: a folder of images, taken in natural order, or a video, whose frames are named by their numbers.
+    """Yield the frames of a folder, in natural order, or of a video, by number, with their names, read one by one.
 
     Raises:
         NoCameraError: there is no such recording, or an image in it cannot be read.
@@ -148,10 +142,7 @@ def read_frames(source: Path) -> Iterator[tuple[str, Image]]:
 
 
 def read_widths(path: Path) -> dict[str, float]:
-    """Read the gripper's width recorded with each image.
-
-    Args:
-        path: CSV with the columns `image` and `width_mm`.
+    """Read the gripper's width at each image from a CSV with the columns `image` and `width_mm`.
 
     Raises:
         CameraError: the file cannot be read or is no such table.

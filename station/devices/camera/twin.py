@@ -11,6 +11,7 @@ import math
 import os
 import struct
 import time
+from collections.abc import AsyncIterator
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from station.devices.camera.interface import (
     NoFrameError,
 )
 from station.messages import camera as messages
-from station.messages.message import Message
+from station.messages.message import Definition, Message
 from station.settings.camera import CameraSettings
 
 _LENGTH = struct.Struct(">I")
@@ -78,11 +79,7 @@ class TwinCamera:
             ) from error
 
     async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
-        """See `Camera.frame`.
-
-        Raises:
-            NoFrameError: no such frame came in time.
-        """
+        """See `Camera.frame`."""
         return await self._feed.newer(newer_than_s, deadline_s)
 
     async def set_leds(self, leds: Leds) -> None:
@@ -91,27 +88,15 @@ class TwinCamera:
         Raises:
             CameraError: the twin does not answer, or refuses.
         """
-        try:
-            async with asyncio.timeout(_SILENCE_S):
-                reader, writer = await self._ask(
-                    {"kind": "leds", "red": leds.red, "green": leds.green, "blue": leds.blue}
-                )
-                try:
-                    answer = await _read_header(reader)
-                finally:
-                    await _close(writer)
-        except (OSError, EOFError, TimeoutError) as error:
-            raise CameraError(messages.TWIN_LIGHT_NOT_SET(address=self._where, reason=_describe(error))) from error
+        request = {"kind": "leds", "red": leds.red, "green": leds.green, "blue": leds.blue}
+        async with self._asked(request, messages.TWIN_LIGHT_NOT_SET) as reader:
+            answer = await _read_header(reader)
         if answer.get("kind") != "leds":
             reason = str(answer.get("message"))
             raise CameraError(messages.TWIN_LIGHT_REFUSED(address=self._where, reason=reason))
 
     async def true_mask(self, sequence: int, shape: tuple[int, ...]) -> Mask:
-        """Return the true contact mask of a frame, which only a twin has; never used for a measurement.
-
-        Args:
-            sequence: of one of the last frames of this camera.
-            shape: of its image.
+        """Return the true contact mask of one of the last frames, which only a twin has; never for a measurement.
 
         Returns:
             Shape (height, width), dtype uint8, 0 or 255.
@@ -119,19 +104,12 @@ class TwinCamera:
         Raises:
             CameraError: the twin does not answer, or the frame is too old.
         """
-        try:
-            async with asyncio.timeout(_SILENCE_S):
-                reader, writer = await self._ask({"kind": "truth", "sequence": sequence})
-                try:
-                    answer = await _read_header(reader)
-                    if answer.get("kind") != "truth" or answer.get("bytes") != shape[0] * shape[1]:
-                        reason = str(answer.get("message"))
-                        raise CameraError(messages.TWIN_NO_TRUTH(address=self._where, reason=reason))
-                    pixels = await reader.readexactly(answer["bytes"])
-                finally:
-                    await _close(writer)
-        except (OSError, EOFError, TimeoutError) as error:
-            raise CameraError(messages.TWIN_TRUTH_NOT_READ(address=self._where, reason=_describe(error))) from error
+        async with self._asked({"kind": "truth", "sequence": sequence}, messages.TWIN_TRUTH_NOT_READ) as reader:
+            answer = await _read_header(reader)
+            if answer.get("kind") != "truth" or answer.get("bytes") != shape[0] * shape[1]:
+                reason = str(answer.get("message"))
+                raise CameraError(messages.TWIN_NO_TRUTH(address=self._where, reason=reason))
+            pixels = await reader.readexactly(answer["bytes"])
         return np.frombuffer(pixels, np.uint8).reshape(shape[:2])
 
     async def close(self) -> None:
@@ -167,6 +145,19 @@ class TwinCamera:
                 self._feed.publish(image, received_s - age_s, sequence=sequence)
         finally:
             await _close(writer)
+
+    @contextlib.asynccontextmanager
+    async def _asked(self, request: dict[str, Any], failed: Definition) -> AsyncIterator[asyncio.StreamReader]:
+        """Ask on a connection of its own; raise `CameraError` with `failed` where that breaks."""
+        try:
+            async with asyncio.timeout(_SILENCE_S):
+                reader, writer = await self._ask(request)
+                try:
+                    yield reader
+                finally:
+                    await _close(writer)
+        except (OSError, EOFError, TimeoutError) as error:
+            raise CameraError(failed(address=self._where, reason=_describe(error))) from error
 
     async def _ask(self, request: dict[str, Any]) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
         host, port = self._settings.twin.host, self._settings.twin.port

@@ -18,11 +18,7 @@ _ROUNDING = 1e-9
 
 
 def width_of_count(count: int, calibration: GripperCalibration) -> float:
-    """Return the gap for fruit at a position, mm; negative if the fingers press on each other.
-
-    Args:
-        count: position as read, 0 to 255.
-    """
+    """Return the gap for fruit at a position, 0 to 255, mm; negative if the fingers press on each other."""
     opening_mm = (calibration.closed_count - count) * calibration.mm_per_count
     return opening_mm - calibration.finger_offset_mm
 
@@ -33,10 +29,7 @@ def max_width_mm(calibration: GripperCalibration) -> float:
 
 
 def count_for_width(width_mm: float, calibration: GripperCalibration) -> int:
-    """Return the position whose width is nearest, at most half a count away; a tie gives the wider gap.
-
-    Args:
-        width_mm: 0 to the widest gap of the finger set.
+    """Return the position nearest to a width, mm, at most half a count away; a tie gives the wider gap.
 
     Raises:
         GripperRequestError: the width is out of reach.

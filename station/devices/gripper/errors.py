@@ -110,3 +110,7 @@ class GripperFaultError(GripperError):
         super().__init__(cause, text.remedy)
         self.fault_code = fault_code
         self.code = text.name
+
+
+LINK_ERRORS = (GripperUnreachableError, GripperLinkLostError, GripperSilentError, GripperProtocolError)
+"""Errors of the connection, which say nothing of the fingers."""

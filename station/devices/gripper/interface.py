@@ -40,11 +40,7 @@ class GripperReading:
     """Monotonic time just before the request."""
 
     def age_s(self, now_s: float) -> float:
-        """Return the age of the reading, in seconds.
-
-        Args:
-            now_s: monotonic time, as of `time.monotonic()`.
-        """
+        """Return the age of the reading, in seconds, at a time of `time.monotonic()`."""
         return now_s - self.at_s
 
 
@@ -78,11 +74,7 @@ class Gripper(Protocol):
         ...
 
     async def open(self, width_mm: float | None = None) -> MoveResult:
-        """Open fast: fully, or to a width. Idempotent.
-
-        Args:
-            width_mm: gap between the finger surfaces; None for `max_width_mm`.
-        """
+        """Open fast to a gap between the finger surfaces; None for `max_width_mm`. Idempotent."""
         ...
 
     async def move_to_width(self, width_mm: float, speed_mm_s: float, force_N: float) -> MoveResult:

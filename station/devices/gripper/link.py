@@ -61,13 +61,7 @@ class Link(Protocol):
         ...
 
     async def go_to(self, position: int, speed: int, force: int) -> None:
-        """Move; only for an active gripper.
-
-        Args:
-            position: 0 to 255.
-            speed: 0 to 255.
-            force: 0 to 255.
-        """
+        """Move; only for an active gripper. Position, speed and force are 0 to 255."""
         ...
 
     async def halt(self) -> None:

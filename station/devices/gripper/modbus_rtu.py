@@ -6,7 +6,7 @@ Registers: Robotiq 2F-85 & 2F-140 instruction manual, chapter 4. Unverified on h
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 from pymodbus.exceptions import ConnectionException, ModbusException
@@ -188,27 +188,17 @@ class ModbusRtuLink:
                 self._received = data
             return data
 
+        common: dict[str, Any] = {
+            "framer": FramerType.RTU,
+            "timeout": self._answer_timeout_s,
+            "retries": 0,
+            "reconnect_delay": 0,
+            "trace_connect": on_connect,
+            "trace_packet": on_packet,
+        }
         if settings.line == "serial":
-            return AsyncModbusSerialClient(
-                settings.serial_port,
-                framer=FramerType.RTU,
-                baudrate=settings.baud_rate,
-                timeout=self._answer_timeout_s,
-                retries=0,
-                reconnect_delay=0,
-                trace_connect=on_connect,
-                trace_packet=on_packet,
-            )
-        return AsyncModbusTcpClient(
-            settings.host,
-            port=settings.port,
-            framer=FramerType.RTU,
-            timeout=self._answer_timeout_s,
-            retries=0,
-            reconnect_delay=0,
-            trace_connect=on_connect,
-            trace_packet=on_packet,
-        )
+            return AsyncModbusSerialClient(settings.serial_port, baudrate=settings.baud_rate, **common)
+        return AsyncModbusTcpClient(settings.host, port=settings.port, **common)
 
 
 async def _called(request: Callable[[_Client], Awaitable[ModbusPDU]], client: _Client) -> ModbusPDU:

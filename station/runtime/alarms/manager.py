@@ -7,22 +7,19 @@ import time
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import FrameFault
 from station.devices.gripper.errors import (
+    LINK_ERRORS,
     GripperEmergencyStopError,
-    GripperLinkLostError,
-    GripperProtocolError,
-    GripperSilentError,
     GripperTimeoutError,
-    GripperUnreachableError,
 )
 from station.errors import StationError
 from station.inspection.alarm_table import ALARMS, AlarmId
 from station.inspection.alarms import CAUSED, Alarms
 from station.messages import alarm_commands as messages
 from station.messages.message import Message, message_in, message_of, text_of
+from station.records.clock import utc_ms
 from station.records.errors import RecordsError
 from station.records.model import AlarmEntry, AlarmRow
 from station.records.records import Records
-from station.runtime.cycle.inspection import utc_ms
 from station.runtime.devices.manager import ARM, CAMERA, GRIPPER
 from station.runtime.devices.rig import FramesError
 from station.runtime.observability.metrics import Metrics
@@ -59,15 +56,10 @@ _FRAMES = (
     (frozenset(FrameFault), AlarmId.CAMERA_SATURATED),
 )
 """The alarm of bad frames, by the first of these that any of them had."""
-_GRIPPER_LINK = (GripperUnreachableError, GripperLinkLostError, GripperSilentError, GripperProtocolError)
 
 
 def alarm_of(device: str, fault: StationError) -> AlarmId:
-    """Return the alarm that reports a device's fault.
-
-    Args:
-        device: `arm`, `gripper` or `camera`.
-    """
+    """Return the alarm that reports a fault of the `arm`, `gripper` or `camera`."""
     match fault:
         case FramesError():
             return next((alarm for faults, alarm in _FRAMES if fault.faults & faults), AlarmId.CAMERA_STALE)
@@ -77,20 +69,17 @@ def alarm_of(device: str, fault: StationError) -> AlarmId:
             return AlarmId.EMERGENCY_STOP
         case GripperTimeoutError():
             return AlarmId.GRIPPER_JAM
-        case _ if isinstance(fault, _GRIPPER_LINK):
+        case _ if isinstance(fault, LINK_ERRORS):
             return AlarmId.GRIPPER_LINK_LOST
     return {ARM: AlarmId.ARM_LINK_LOST, GRIPPER: AlarmId.GRIPPER_FAULT, CAMERA: AlarmId.CAMERA_LOST}[device]
 
 
 class AlarmManager:
-    """Alarm states of the station. Every method is immediate; `keep` makes the changes durable afterwards.
-
-    Args:
-        metrics: receives the active alarms.
-    """
+    """Alarm states of the station. Every method is immediate; `store_changes` makes the changes durable afterwards."""
 
     def __init__(self, metrics: Metrics) -> None:
-        self._alarms = Alarms()
+        self.alarms = Alarms()
+        """All alarms, as a value."""
         self._metrics = metrics
         self._present: set[AlarmId] = set()
         self._device_alarms: dict[str, AlarmId | None] = {}
@@ -98,41 +87,27 @@ class AlarmManager:
         self._unsaved: list[AlarmEntry] = []
         self._changed = asyncio.Event()
 
-    @property
-    def alarms(self) -> Alarms:
-        """Return all alarms, as a value."""
-        return self._alarms
-
     def raise_(self, alarm: AlarmId, detail: Message | None) -> None:
         """Raise an alarm; it is published once for as long as its cause is present."""
         if alarm not in self._present:
             self._present.add(alarm)
-            self._set(self._alarms.raise_(alarm, time.time(), detail), alarm, "raised", detail)
+            self._set(self.alarms.raise_(alarm, time.time(), detail), alarm, "raised", detail)
 
     def clear(self, alarm: AlarmId) -> None:
         """Mark an alarm's cause as gone; an alarm whose cause was not present does not change."""
         if alarm in self._present:
             self._present.discard(alarm)
-            self._set(self._alarms.returned(alarm, time.time()), alarm, "cleared")
+            self._set(self.alarms.returned(alarm, time.time()), alarm, "cleared")
 
     def update(self, alarm: AlarmId, detail: Message | None) -> None:
-        """Raise the alarm if `detail` is given, else clear it.
-
-        Args:
-            detail: the finding; None if the cause is gone.
-        """
+        """Raise the alarm with the finding, or clear it if there is none: the cause is gone."""
         if detail is not None:
             self.raise_(alarm, detail)
         else:
             self.clear(alarm)
 
     def set_device_fault(self, device: str, fault: StationError | None) -> None:
-        """Raise the alarm of a device's fault, or clear the alarms of a healthy device.
-
-        Args:
-            device: `arm`, `gripper` or `camera`.
-            fault: None if the device is healthy.
-        """
+        """Raise the alarm of the fault of the `arm`, `gripper` or `camera`, or clear the alarms of a healthy one."""
         told = None if fault is None else alarm_of(device, fault)
         before, self._device_alarms[device] = self._device_alarms.get(device), told
         for alarm in OF_DEVICE[device] | ({before} if before is not None else set()):
@@ -142,55 +117,42 @@ class AlarmManager:
             self.raise_(told, message_of(fault))
 
     def acknowledge(self, alarm: AlarmId) -> bool:
-        """Acknowledge an alarm.
-
-        Returns:
-            Whether that changed anything.
-        """
-        return self._set(self._alarms.acknowledge(alarm), alarm, "acknowledged")
+        """Acknowledge an alarm, and return whether that changed anything."""
+        return self._set(self.alarms.acknowledge(alarm), alarm, "acknowledged")
 
     def shelve(self, alarm: AlarmId, for_s: float, by: str, reason: str) -> bool:
-        """Shelve an alarm for a time.
+        """Shelve an alarm for `LONGEST_SHELVED_S` at most, and return whether that changed anything.
 
-        Args:
-            alarm: a latched alarm, and one that is shelved already, does not change.
-            for_s: at most `LONGEST_SHELVED_S`.
-
-        Returns:
-            Whether that changed anything.
+        A latched alarm, and one that is shelved already, does not change.
         """
         detail = messages.SHELVED(duration_s=for_s, who=by, reason=reason)
-        return self._set(self._alarms.shelve(alarm, time.time(), for_s, by), alarm, "shelved", detail)
+        return self._set(self.alarms.shelve(alarm, time.time(), for_s, by), alarm, "shelved", detail)
 
     def unshelve(self, alarm: AlarmId) -> bool:
-        """Unshelve an alarm; if its cause is present, it has to be acknowledged again.
-
-        Returns:
-            Whether that changed anything.
-        """
-        return self._set(self._alarms.unshelve(alarm), alarm, "unshelved")
+        """Unshelve an alarm, and return whether that changed anything; a present cause has to be acknowledged again."""
+        return self._set(self.alarms.unshelve(alarm), alarm, "unshelved")
 
     def acknowledge_returned(self) -> None:
         """Acknowledge every alarm that has returned to normal: the PLC's command."""
-        self._set_all(self._alarms.acknowledge_returned(), "acknowledged")
+        self._set_all(self.alarms.acknowledge_returned(), "acknowledged")
 
     def reset(self) -> None:
         """Unlatch every latched alarm whose cause is gone, after a person's reset."""
-        alarms = self._alarms
-        for alarm in self._alarms.known:
+        alarms = self.alarms
+        for alarm in self.alarms.known:
             alarms = alarms.reset(alarm)
         self._set_all(alarms, "reset")
 
     def tick(self) -> None:
         """Apply what depends on time, as the end of shelving; call it about once a second."""
-        later = self._alarms.tick(time.time())
-        if later != self._alarms:
-            self._alarms = later
+        later = self.alarms.tick(time.time())
+        if later != self.alarms:
+            self.alarms = later
             self._publish_active()
 
     async def restore(self, records: Records) -> None:
         """Restore the alarms of the previous start; their causes count as present until a check clears them."""
-        self._alarms = Alarms.from_data(
+        self.alarms = Alarms.from_data(
             [
                 {
                     "id": row.id,
@@ -204,7 +166,7 @@ class AlarmManager:
                 for row in await records.load_alarms()
             ]
         )
-        self._present = {alarm.id for alarm in self._alarms.known.values() if alarm.state in CAUSED}
+        self._present = {alarm.id for alarm in self.alarms.known.values() if alarm.state in CAUSED}
         self._publish_active()
 
     async def store_changes(self, records: Records) -> None:
@@ -223,7 +185,7 @@ class AlarmManager:
                     None if alarm.shelved_until_s is None else round(1000 * alarm.shelved_until_s),
                     alarm.shelved_by,
                 )
-                for alarm in self._alarms.known.values()
+                for alarm in self.alarms.known.values()
             )
             try:
                 await records.save_alarms(rows, entries)
@@ -233,9 +195,9 @@ class AlarmManager:
                 del self._unsaved[: len(entries)]
 
     def _set(self, alarms: Alarms, alarm: AlarmId, change: str, detail: Message | None = None) -> bool:
-        if alarms.get(alarm) == self._alarms.get(alarm):
+        if alarms.get(alarm) == self.alarms.get(alarm):
             return False
-        self._alarms = alarms
+        self.alarms = alarms
         self._unsaved = [*self._unsaved, AlarmEntry(utc_ms(), alarm, change, text_of(detail))][-_MOST_UNSAVED:]
         level = logging.WARNING if change == "raised" else logging.INFO
         if detail is None:
@@ -246,12 +208,12 @@ class AlarmManager:
         return True
 
     def _set_all(self, alarms: Alarms, change: str) -> None:
-        for alarm, before in self._alarms.known.items():
+        for alarm, before in self.alarms.known.items():
             if alarms.get(alarm) != before:
                 self._unsaved.append(AlarmEntry(utc_ms(), alarm, change))
-        self._alarms = alarms
+        self.alarms = alarms
         self._publish_active()
 
     def _publish_active(self) -> None:
-        self._metrics.alarms((alarm.id, ALARMS[alarm.id].priority) for alarm in self._alarms.active)
+        self._metrics.alarms((alarm.id, ALARMS[alarm.id].priority) for alarm in self.alarms.active)
         self._changed.set()

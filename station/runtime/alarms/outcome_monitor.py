@@ -13,11 +13,7 @@ _MANY = 5
 
 
 class OutcomeMonitor:
-    """Last outcomes that were published to the PLC.
-
-    Args:
-        alarms: gets an alarm if many could not be judged, or were rejected.
-    """
+    """Last outcomes that were published to the PLC; raises an alarm if many could not be judged, or were rejected."""
 
     def __init__(self, alarms: AlarmManager) -> None:
         self._alarms = alarms

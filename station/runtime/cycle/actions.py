@@ -10,13 +10,7 @@ from dataclasses import replace
 from station.calibration.gate import gated
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import Frame
-from station.devices.gripper.errors import (
-    GripperLinkLostError,
-    GripperProtocolError,
-    GripperSilentError,
-    GripperTimeoutError,
-    GripperUnreachableError,
-)
+from station.devices.gripper.errors import LINK_ERRORS, GripperTimeoutError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.centring import NOT_MOVED, Way, off_middle, too_far
 from station.inspection.cycle import REASONS, Event
@@ -43,23 +37,11 @@ log = logging.getLogger(__name__)
 
 _LET_GO_S, _LET_GO_AGAIN_S = 3.0, 0.2
 """So long, with such pauses, and once in any case the jaws are opened again: cuts in `./run bench wire` are shorter."""
-_WIRE_FAULTS = (
-    GripperLinkLostError,
-    GripperProtocolError,
-    GripperSilentError,
-    GripperTimeoutError,
-    GripperUnreachableError,
-)
+_WIRE_FAULTS = (*LINK_ERRORS, GripperTimeoutError)
 
 
 class Inspector:
-    """The actions that need the devices. Each ends with an event or a device's `StationError`.
-
-    Args:
-        configuration: placing, how old a reference may be, where the arm waits and how it may follow a contact.
-        alarms: raised for a reference that cannot serve.
-        metrics: counts the frames.
-    """
+    """The actions that need the devices. Each ends with an event or a device's `StationError`."""
 
     def __init__(
         self,
@@ -210,13 +192,9 @@ class Inspector:
         return Event.ONSET_FOUND
 
     async def _backed_off(self, now: Inspection, rig: DeviceRig, met: Met, at: Position) -> tuple[Position, Way | None]:
-        """Open to where nothing touched, and say how far the first contact was off the field's middle.
+        """Open to where nothing touched, and say how far the first contact of the sweep was off the field's middle.
 
-        The way is None where there was no contact any more.
-
-        Args:
-            met: where the sweep has met the fruit.
-            at: where the fingers came to rest.
+        The way is None where there was no contact any more; the fingers came to rest at `at`.
         """
         # Measured while the jaws open: they do so whatever it shows.
         measuring = asyncio.ensure_future(self._vision.measure(Step(-1, at, await rig.frames(1))))
@@ -390,12 +368,7 @@ class Inspector:
 
     @staticmethod
     def close_as_no_result(now: Inspection, because: Event, why: Message | None) -> None:
-        """End an inspection that cannot be judged, with what was measured so far.
-
-        Args:
-            because: the event that ended it.
-            why: for a person.
-        """
+        """End an inspection that an event made impossible to judge, with what was measured so far."""
         now.interrupt(REASONS[because], why)
         now.verdict = judge(now.press(), now.active.recipe)
         now.outcome_name = "NO_RESULT"

@@ -16,11 +16,7 @@ log = logging.getLogger(__name__)
 
 
 class Hold:
-    """The event that the next start begins with, in a file. A file that cannot be read counts as a held fruit.
-
-    Args:
-        carries: the arm carries judged fruit to their places.
-    """
+    """The event that the next start begins with, in a file. A file that cannot be read counts as a held fruit."""
 
     def __init__(self, state_files: StateFiles, *, carries: bool) -> None:
         self._files, self._carries = state_files, carries

@@ -13,16 +13,12 @@ from station.messages.message import Message
 from station.press.measurement import measured_point
 from station.press.rig import MeasuredStep, Step
 from station.press.stop import steps_to_decide
+from station.records.clock import utc_ms
 from station.records.first_press import first_press_findings, first_press_measures
 from station.records.judgement import judgement_measures
 from station.records.model import CurvePoint, Image, InspectionRecord, Trigger
 from station.runtime.recipes.active import ActiveRecipe
 from station.vocabulary import OutcomeName, Reason
-
-
-def utc_ms() -> int:
-    """Milliseconds since 1970-01-01 UTC; for records, never for waits."""
-    return time.time_ns() // 1_000_000
 
 
 @dataclass(slots=True)
@@ -110,12 +106,7 @@ class Inspection:
         return next((seen.step.move.width_mm for seen in self.seen if seen.contact.is_firm), None)
 
     def interrupt(self, reason: Reason, why: Message | None) -> None:
-        """Something from outside the measurement ended or spoilt it.
-
-        Args:
-            reason: for the PLC.
-            why: for a person.
-        """
+        """Something from outside the measurement ended or spoilt it: the reason for the PLC, and why for a person."""
         if reason not in self.interruptions:
             self.interruptions.append(reason)
         if why is not None and why not in self.explanation:
@@ -151,19 +142,15 @@ class Inspection:
 
     def _latest(self) -> Press:
         """The present press."""
-        onset_mm = self.onset_mm
-        if onset_mm is None:
-            return self._press(None, 0.0, ())
-        untouched = [seen.step.move.width_mm for seen in self.seen if seen.step.move.width_mm > onset_mm]
-        if self.before_onset_mm is not None:
-            untouched.append(self.before_onset_mm)
-        sooner_mm = min(untouched) - onset_mm if untouched else 0.0
-        points = tuple(
-            measured_point(seen.contact, onset_mm - seen.step.move.width_mm, self.mm_per_px) for seen in self.seen
-        )
-        return self._press(onset_mm, sooner_mm, points)
-
-    def _press(self, onset_mm: float | None, sooner_mm: float, points: tuple[Measured, ...]) -> Press:
+        onset_mm, sooner_mm, points = self.onset_mm, 0.0, tuple[Measured, ...]()
+        if onset_mm is not None:
+            untouched = [seen.step.move.width_mm for seen in self.seen if seen.step.move.width_mm > onset_mm]
+            if self.before_onset_mm is not None:
+                untouched.append(self.before_onset_mm)
+            sooner_mm = min(untouched) - onset_mm if untouched else 0.0
+            points = tuple(
+                measured_point(seen.contact, onset_mm - seen.step.move.width_mm, self.mm_per_px) for seen in self.seen
+            )
         return Press(
             onset_mm,
             sooner_mm,

@@ -21,11 +21,7 @@ _FRAMES_PER_S = 30.0
 
 
 class Pacing:
-    """The deadlines of one cell.
-
-    Args:
-        cell: the devices; a camera tells its rate once it is open.
-    """
+    """The deadlines of one cell, whose camera reports its rate once it is open."""
 
     def __init__(self, configuration: Configuration, cell: Cell) -> None:
         self._configuration, self._cell = configuration, cell
@@ -49,10 +45,7 @@ class Pacing:
         return deadlines(recipe, pace)
 
     def check(self, recipe: Recipe) -> None:
-        """Check that the site's deadline leaves time for a recipe's longest way through the cycle.
-
-        Args:
-            recipe: one that is to become active.
+        """Check that the site's deadline leaves time for the longest way of a recipe that is to become active.
 
         Raises:
             BadInputError: it does not, or an inspection would take longer than the PLC can be told.
@@ -63,11 +56,7 @@ class Pacing:
             raise BadInputError(DEADLINE_TOO_SHORT(recipe=recipe.name, needed_s=needed_s, allowed_s=allowed_s))
 
     def limits(self, recipe: Recipe) -> Deadlines:
-        """The same with the site's patience, and its deadline of a whole inspection.
-
-        Args:
-            recipe: one that `check` has passed.
-        """
+        """The limits of a recipe that `check` has passed, with the site's patience and its deadline of all of it."""
         expected, settings = self.expected(recipe), self._configuration.service
         own_s = min(settings.patience * expected.inspection_s, LONGEST_S - RECORD_NO_RESULT_S)
         return expected._replace(
@@ -90,11 +79,7 @@ def longest_move_s(arm: ArmSettings) -> float:
 
 
 def way_s(arm: ArmSettings, *poses: PoseName) -> float:
-    """The time of a way over the arm's places, with a stop at each: its leading joint speeds up, travels and brakes.
-
-    Args:
-        poses: at least two.
-    """
+    """The time of a way over two places or more, with a stop at each: its leading joint speeds up, travels, brakes."""
     places = [arm.poses.joints_rad(pose) for pose in poses]
     ways_rad = [max(abs(a - b) for a, b in zip(*pair, strict=True)) for pair in pairwise(places)]
     ramp_s = arm.joint_speed_rad_s / arm.joint_acceleration_rad_s2

@@ -30,11 +30,7 @@ class RecentTriggers:
         return self._inspections.get(self._last[1])
 
     def accepted(self, request: Begin, now: Inspection) -> None:
-        """Add a durable trigger whose inspection has begun; earlier inspections are over and release their pictures.
-
-        Args:
-            now: with its sequence.
-        """
+        """Add a durable trigger whose inspection, with its sequence, has begun; earlier ones release their pictures."""
         assert now.sequence is not None  # noqa: S101 (it is durable)
         self._last = (request, now.sequence)
         for earlier in self._inspections.values():
@@ -62,10 +58,7 @@ class RecentTriggers:
         return self._inspections.get(sequence)
 
     async def outcome(self, sequence: int) -> Outcome:
-        """Wait for an outcome.
-
-        Args:
-            sequence: of an inspection of this start of the station.
+        """Wait for an outcome of an inspection of this start of the station.
 
         Raises:
             UnknownInspectionError: none of the last has this number.

@@ -21,62 +21,46 @@ log = logging.getLogger(__name__)
 
 
 class InspectionRegistry:
-    """Records of this start's inspections; none is left without an outcome.
-
-    Args:
-        records: opened, or reopened once `fault` is repaired.
-        triggers: receives the outcomes for the callers that wait.
-        devices: gives the device names for the records.
-        versions: of the programs, for the records.
-    """
+    """Records of this start's inspections, with the devices' and programs' names; none is left without an outcome."""
 
     def __init__(
         self, records: Records, triggers: RecentTriggers, devices: DeviceManager, versions: Mapping[str, str]
     ) -> None:
         self.records = records
-        self._fault: RecordsError | None = None
+        self.fault: RecordsError | None = None
+        """Of the records, until they were reopened."""
         self._on_outcome: Callable[[Inspection], None] = lambda _: None
         self._triggers, self._devices, self._versions = triggers, devices, versions
         self._begun: list[Inspection] = []
         """Accepted, in order, and perhaps without a durable outcome."""
         self._closing = asyncio.Lock()
 
-    @property
-    def fault(self) -> RecordsError | None:
-        """Return the fault of the records, until they were reopened."""
-        return self._fault
-
     def listen(self, on_outcome: Callable[[Inspection], None]) -> None:
-        """Call a function with every inspection once its outcome is durable.
-
-        Args:
-            on_outcome: takes the place of the one before.
-        """
+        """Call a function, in place of the one before, with every inspection once its outcome is durable."""
         self._on_outcome = on_outcome
 
     async def reopen(self, restore: Callable[[], Awaitable[None]] | None = None, reserve_bytes: int = 0) -> None:
-        """Open the records, again after a fault, which ends once they can be read and written.
+        """Open the records, again after a fault, which ends once they can be used and `reserve_bytes` are free.
 
         Args:
             restore: reads what another part needs of them.
-            reserve_bytes: with less free space a fault stays.
         """
         try:
             await self.records.reopen()
             if restore is not None:
                 await restore()
         except RecordsError as error:
-            self._fault = error
+            self.fault = error
         else:
             if self.records.status().free_bytes >= reserve_bytes:
-                self._fault = None
+                self.fault = None
 
     async def find_damage(self) -> RecordsError | None:
         """Check the records for damage, which is a fault from then on."""
         try:
             await self.records.find_damage()
         except RecordsError as error:
-            self._fault = error
+            self.fault = error
             return error
         return None
 
@@ -86,10 +70,7 @@ class InspectionRegistry:
         return next((now for now in self._begun if now.standing is None), None)
 
     async def begin(self, pending: PendingTrigger) -> None:
-        """Make a trigger durable.
-
-        Args:
-            pending: gets its record's number.
+        """Make a trigger durable; it gets its record's number.
 
         Raises:
             RecordsError: the trigger could not be stored.
@@ -98,7 +79,7 @@ class InspectionRegistry:
         try:
             pending.inspection.sequence = await pending.recording
         except RecordsError as error:
-            self._fault = error
+            self.fault = error
             raise
 
     def accepted(self, now: Inspection) -> None:
@@ -119,16 +100,12 @@ class InspectionRegistry:
         try:
             now.standing = await self.records.conclude(now.sequence, signed, now.trigger)
         except RecordsError as error:
-            self._fault = error
+            self.fault = error
             raise
         return Event.RECORDED
 
     def deliver(self, now: Inspection) -> None:
-        """Pass a durable outcome to the callers that wait for it.
-
-        Args:
-            now: without an outcome nothing is passed on.
-        """
+        """Pass a durable outcome, if there is one, to the callers that wait for it."""
         if now.standing is not None:
             self._triggers.ended(now.standing)
             self._on_outcome(now)

@@ -66,61 +66,34 @@ class Performer(Protocol):
     """Who carries the actions out."""
 
     def perform(self, action: Action, because: Happened) -> Work | None:
-        """Carry an action out; where it takes time, give what runs beside everything else and ends with its event.
-
-        Args:
-            action: what to do; never HALT.
-            because: the event that led to it.
-        """
-        ...
+        """Carry an action out, never HALT; if it takes time, give what runs beside all else and ends with its event."""
 
     async def halt(self) -> None:
         """Stop the devices where they are; bounded, and raises nothing."""
-        ...
 
     def storing(self, event: Event, state: State) -> Awaitable[None] | None:
-        """Give what has to be durable before a state is shown; None where nothing changes.
-
-        Args:
-            event: which leads to the state.
-        """
-        ...
+        """Give what has to be durable before the state that the event leads to is shown; None where nothing changes."""
 
     def raise_alarm(self, told: Raise, why: Message | None) -> None:
-        """Raise an alarm.
-
-        Args:
-            why: what was seen.
-        """
-        ...
+        """Raise an alarm, with what was seen."""
 
     def entered(self, state: State, after: State, took_s: float) -> None:
-        """The state has changed.
-
-        Args:
-            took_s: how long that was held.
-        """
-        ...
+        """The state has changed; the one before was held for `took_s`."""
 
     def failed(self, fault: StationError) -> None:
         """An action ran into this; its event follows."""
-        ...
 
     def refused(self, state: State, event: Event) -> None:
         """An event came that the table does not list; nothing was done."""
-        ...
 
     def tick(self) -> None:
         """Called about ten times a second, and after every event: whatever depends on time alone."""
-        ...
 
 
 class CycleRunner:
-    """One task takes the events in their order; the actions run beside it.
+    """One task takes the events in their order; the performer's actions run beside it.
 
-    Args:
-        performer: who carries the actions out.
-        hold: what only a person may end, from the start before.
+    It begins with the hold from the start before, which only a person may end.
     """
 
     def __init__(self, performer: Performer, hold: Event | None = None) -> None:
@@ -143,11 +116,7 @@ class CycleRunner:
         return time.monotonic() - self.entered_s
 
     def post(self, event: Event, why: Message | None = None) -> None:
-        """Report an event from outside of the actions.
-
-        Args:
-            why: for a person.
-        """
+        """Report an event from outside of the actions, with a reason for a person."""
         self._events.put_nowait(Happened(event, why, None))
 
     async def run(self) -> None:
@@ -172,6 +141,10 @@ class CycleRunner:
             self._changed.clear()
             await self._changed.wait()
         return self.state
+
+    def check_again(self) -> None:
+        """Have everyone who waits in `until` check again: something else than the state has changed."""
+        self._changed.set()
 
     async def _take(self, happened: Happened) -> None:
         if happened.by is not None and happened.by not in self._doing:

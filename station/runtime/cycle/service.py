@@ -13,6 +13,7 @@ from station.inspection.cycle import ACCEPTING, REASONS, UNJUDGED, Action, Event
 from station.inspection.states import STATES, State
 from station.messages import operation as messages
 from station.messages.message import Message, message_of
+from station.records.clock import utc_ms
 from station.records.errors import RecordsError
 from station.records.model import Trigger
 from station.records.records import Records
@@ -20,7 +21,7 @@ from station.runtime.alarms.manager import AlarmManager
 from station.runtime.alarms.outcome_monitor import OutcomeMonitor
 from station.runtime.cycle.actions import Inspector
 from station.runtime.cycle.hold import Hold
-from station.runtime.cycle.inspection import Inspection, utc_ms
+from station.runtime.cycle.inspection import Inspection
 from station.runtime.cycle.pacing import RECORD_NO_RESULT_S, Pacing, late_now
 from station.runtime.cycle.recent_triggers import PendingTrigger, RecentTriggers
 from station.runtime.cycle.registry import InspectionRegistry
@@ -37,14 +38,7 @@ _LEASE_S = 2.0
 
 
 class Service:
-    """Performer of the cycle, and server of the line's requests.
-
-    Args:
-        devices: the devices; gets the start and end of inspections.
-        inspector: carries out what needs the devices.
-        alarms: raised and cleared by the cycle.
-        observability: gets the cycle's progress and counts; its versions go into the records.
-    """
+    """Performer of the cycle, and server of the line's requests."""
 
     def __init__(
         self,
@@ -65,9 +59,13 @@ class Service:
         self.triggers = RecentTriggers()
         self.registry = InspectionRegistry(records, self.triggers, devices, observability.versions)
         self.pacing = Pacing(configuration, devices.cell)
-        self._active: ActiveRecipe | None = None
+        self.active: ActiveRecipe | None = None
+        """The recipe that the next fruit is inspected with."""
         self._reset_wanted = self._settings.automatic_reset and self._hold.event is None
-        self._ending, self._stopped_by_person = False, False
+        self.ending = False
+        """The end of the process was requested."""
+        self.stopped_by_person = False
+        """A person has stopped the station, until the next reset."""
         self._on_published: Callable[[Outcome], None] = lambda _: None
         self._pending: PendingTrigger | None = None
         self._now: Inspection | None = None
@@ -115,62 +113,43 @@ class Service:
         """Return the cycle's state."""
         return self.runner.state
 
-    @property
-    def active(self) -> ActiveRecipe | None:
-        """Return the recipe that the next fruit is inspected with."""
-        return self._active
-
     def set_active(self, active: ActiveRecipe | None) -> None:
         """Inspect the next fruit with another recipe; without one no trigger is accepted."""
-        self._active = active
-
-    @property
-    def ending(self) -> bool:
-        """Return whether the end of the process was requested."""
-        return self._ending
+        self.active = active
 
     def end(self) -> None:
         """Accept no trigger any more: the process is about to end."""
-        self._ending = True
+        self.ending = True
 
     @property
     def makes_itself_ready(self) -> bool:
         """Return whether anything may move between fruits without a person's or the PLC's reset."""
-        return self._reset_wanted and not (self._ending or self._stopped_by_person)
-
-    @property
-    def stopped_by_person(self) -> bool:
-        """Return whether a person has stopped the station, until the next reset."""
-        return self._stopped_by_person
+        return self._reset_wanted and not (self.ending or self.stopped_by_person)
 
     def stop(self) -> None:
         """Accept no trigger until `allow`: a person has stopped the station."""
-        self._stopped_by_person = True
+        self.stopped_by_person = True
+        self.runner.check_again()
 
     def allow(self) -> None:
         """End a person's stop."""
-        self._stopped_by_person = False
+        self.stopped_by_person = False
+        self.runner.check_again()
 
     def request_reset(self) -> None:
         """Let a stopped station make itself ready."""
         self._reset_wanted = True
 
     def listen(self, on_published: Callable[[Outcome], None]) -> None:
-        """Call a function once with every outcome that the PLC was given.
-
-        Args:
-            on_published: takes the place of the one before.
-        """
+        """Call a function, in place of the one before, once with every outcome that the PLC was given."""
         self._on_published = on_published
 
     # Requests of the line.
 
     async def begin(self, request: Begin, refusal: Refusal | None, lot: str) -> BeginReply:
-        """Begin an inspection, or refuse it. The same request again, before its outcome was published, begins none.
+        """Begin an inspection of a lot's fruit, or refuse it with the refusal given.
 
-        Args:
-            refusal: why none may begin now.
-            lot: of the fruit.
+        The same request again, before its outcome was published, begins none.
         """
         async with self._beginning:
             if (same := self.triggers.repeated(request)) is not None:
@@ -203,11 +182,7 @@ class Service:
             return await self._pending.answered()
 
     async def published(self, outcome: Outcome) -> None:
-        """Store that the PLC was given an outcome, and count it, once; a fruit still under inspection is cancelled.
-
-        Args:
-            outcome: the final one.
-        """
+        """Store that the PLC was given a final outcome, and count it, once; cancel a fruit still under inspection."""
         first = await self.registry.records.published(outcome)
         self.triggers.published(outcome)
         if first:
@@ -277,23 +252,19 @@ class Service:
         if not self._liveness.stuck():
             self._devices.renew_health(_LEASE_S)
         self._report_late()
-        if self._ending and self.state in {State.IDLE, *UNJUDGED} and self._late_in is None:
+        if self.ending and self.state in {State.IDLE, *UNJUDGED} and self._late_in is None:
             self._late_in = self.state
             self.runner.post(Event.STOP, messages.STATION_ENDS())
 
     def device_changed(self, fault: StationError | None) -> None:
-        """Handle a monitor's report that a device's state has changed.
-
-        Args:
-            fault: from now on; None for no fault.
-        """
+        """Handle a monitor's report that a device has another fault from now on, or none."""
         if fault is not None:
             self.runner.post(event_of(fault), message_of(fault))
 
     # The actions.
 
     async def _check(self) -> Event:
-        if self._ending or self._stopped_by_person:
+        if self.ending or self.stopped_by_person:
             return Event.STOP
         for fault in (*self._devices.faults.values(), self.registry.fault):
             if fault is not None:

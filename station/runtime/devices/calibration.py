@@ -35,12 +35,7 @@ class CalibrationFigures(NamedTuple):
 
 
 class ActiveCalibration:
-    """Newest calibration of the sensor in use; read again when another one is stored.
-
-    Args:
-        serial: returns the sensor's serial number.
-        clock: seconds since 1970, as calibrations are dated.
-    """
+    """Newest calibration of the sensor in use; read again when another one is stored. The clock is in s since 1970."""
 
     def __init__(
         self, configuration: Configuration, serial: Callable[[], str], clock: Callable[[], float] = time.time

@@ -11,7 +11,6 @@ class CalibrationRig(DeviceRig):
     """Rig for the procedures of `station.calibration`; the arm moves only between the nest and home.
 
     Args:
-        cell: the opened devices.
         lay: has the ball laid at a place; returns once it is there.
         patience: factor on the longest wait for a frame.
     """
@@ -23,9 +22,5 @@ class CalibrationRig(DeviceRig):
         self._lay = lay
 
     async def lay(self, place: Place) -> None:
-        """Have the ball laid at another place.
-
-        Args:
-            place: relative to the first place.
-        """
+        """Have the ball laid at another place, relative to the first."""
         await self._lay(place)

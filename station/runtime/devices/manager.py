@@ -120,20 +120,12 @@ class DeviceManager:
         return {name: watch.fault for name, watch in self.monitors.items() if watch.fault is not None}
 
     def healthy_since(self, since_s: float) -> bool:
-        """Check that every device was found healthy after a time, and none has a fault.
-
-        Args:
-            since_s: monotonic time.
-        """
+        """Check that every device was found healthy after a monotonic time, and none has a fault."""
         watches = self.monitors.values()
         return all(w.fault is None and w.heard_s is not None and w.heard_s > since_s for w in watches)
 
     def use(self, *, by_inspection: bool) -> None:
-        """Leave camera and gripper to an inspection, or monitor them again; the arm is always monitored.
-
-        Args:
-            by_inspection: whether an inspection is under way.
-        """
+        """Leave camera and gripper to an inspection, or monitor them again; the arm is always monitored."""
         for name in (CAMERA, GRIPPER):
             self.monitors[name].use(by_inspection=by_inspection)
 
@@ -164,11 +156,7 @@ class DeviceManager:
         return next((fault for fault in self.faults.values() if _is_stop(fault)), None)
 
     def renew_health(self, lease_s: float) -> None:
-        """Let the arm move for a time; its controller stops it when the lease runs out.
-
-        Args:
-            lease_s: seconds from now.
-        """
+        """Let the arm move for some seconds from now; its controller stops it when the lease runs out."""
         if self._arm is not None:
             self._arm.renew_health(lease_s)
 
@@ -186,10 +174,7 @@ class DeviceManager:
         )
 
     async def recover(self, what: RecoveryName) -> None:
-        """Recover the arm after a stop, as a person at the cell requested; nothing moves by it.
-
-        Args:
-            what: the stop that the person has checked.
+        """Recover the arm after a stop that a person at the cell has checked; nothing moves by it.
 
         Raises:
             ArmFault: the recovery failed.

@@ -29,9 +29,7 @@ class DeviceMonitor:
     """Monitor task of one device. It runs for ever, with growing pauses while the device is away.
 
     Args:
-        name: of the device, as in the log.
-        title: its name as a person reads it.
-        longest_pause_s: between two checks.
+        name: of the device, as in the log; its title is what a person reads.
         on_change: gets the fault from now on, None for no fault.
         on_progress: called after each check, whatever its result.
     """
@@ -66,11 +64,7 @@ class DeviceMonitor:
         return None if self.heard_s is None else time.monotonic() - self.heard_s
 
     def use(self, *, by_inspection: bool) -> None:
-        """Leave the device to a caller, who reports its faults, or check it again.
-
-        Args:
-            by_inspection: whether a caller works with it.
-        """
+        """Leave the device to an inspection, which reports its faults, or check it again."""
         self._in_use = by_inspection
 
     def report_success(self) -> None:

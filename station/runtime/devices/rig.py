@@ -43,11 +43,9 @@ class Cell:
 
 
 class DeviceRig:
-    """The moves and frames of a press by a recipe.
+    """The moves and frames of a press by a recipe's speed, force and settle time, with opened devices.
 
     Args:
-        cell: the devices, opened.
-        recipe: speed, force and settle time.
         frame_deadline_s: longest wait for one frame.
         on_frame: gets every frame as it comes, also those with faults.
     """
@@ -95,11 +93,7 @@ class DeviceRig:
         return _position(await self._cell.gripper.open(width_mm))
 
     async def close_to(self, width_mm: float) -> Position:
-        """Move the fingers at the recipe's speed and force.
-
-        Args:
-            width_mm: the width to ask for; less than 0 is 0.
-        """
+        """Move the fingers at the recipe's speed and force; a width of less than 0 is 0."""
         grip = self._recipe.gripper
         return _position(await self._cell.gripper.move_to_width(max(0.0, width_mm), grip.speed_mm_s, grip.force_n))
 
@@ -153,11 +147,8 @@ class DeviceRig:
     async def release(self, failed: Message | None = None) -> None:
         """Open, then leave: an arm that leaves with closed fingers would tear what they hold.
 
-        Args:
-            failed: what failed before; part of the error's message.
-
         Raises:
-            GripError: the gripper did not open, or the arm did not leave.
+            GripError: the gripper did not open, or the arm did not leave; it names what had failed before, too.
         """
         try:
             await self._cell.gripper.open()
@@ -201,11 +192,7 @@ def _combined(after: Message | None, reason: Message, alone: Definition, with_sa
 
 
 async def at_once(*works: Coroutine[None, None, object]) -> None:
-    """Do several things at the same time; where one fails the others are cancelled, and its error is raised.
-
-    Args:
-        works: not begun yet.
-    """
+    """Do several things, not begun yet, at once; if one fails the others are cancelled, and its error is raised."""
     try:
         async with asyncio.TaskGroup() as group:
             for work in works:
@@ -216,11 +203,7 @@ async def at_once(*works: Coroutine[None, None, object]) -> None:
 
 @contextlib.asynccontextmanager
 async def renewed_lease(arm: Arm | None) -> AsyncIterator[None]:
-    """Renew the arm's lease while this program's loop runs: if the loop hangs, the controller stops the arm.
-
-    Args:
-        arm: None without an arm: nothing is renewed.
-    """
+    """Renew an arm's lease while this program's loop runs: if the loop hangs, the controller stops the arm."""
 
     async def renew(arm: Arm) -> None:
         while True:

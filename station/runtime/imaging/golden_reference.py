@@ -23,9 +23,6 @@ class GoldenReference:
 
     For a calibrated sensor it is the calibration's. Else it is the first reference that is taken; after a change of
     the gel or its cleaning, a person removes the file and the next reference replaces it.
-
-    Args:
-        calibrated: returns the calibration's file; None if there is none.
     """
 
     def __init__(self, state_files: StateFiles, calibrated: Callable[[], Path | None] = lambda: None) -> None:
@@ -33,11 +30,7 @@ class GoldenReference:
         self._prepared: tuple[bytes, Segmentation, PreparedReference] | None = None
 
     def prepared(self, segmentation: Segmentation) -> PreparedReference | None:
-        """Return the golden reference, prepared for comparisons; None if there is none that can be read.
-
-        Args:
-            segmentation: of the recipe; finds a contact between the golden and another reference.
-        """
+        """Return the golden reference, prepared for comparisons by a segmentation; None if none can be read."""
         data, renewal = self._read()
         if data is None:
             return None
@@ -56,11 +49,7 @@ class GoldenReference:
         return self._prepared[2]
 
     def store_first(self, image: Image) -> None:
-        """Store a picture as the golden reference if there is none yet.
-
-        Args:
-            image: shape (height, width, 3), dtype uint8, BGR.
-        """
+        """Store a picture, (height, width, 3), uint8, BGR, as the golden reference if there is none yet."""
         if self._read()[0] is None:
             self._state_files.write(GOLDEN, cv2.imencode(".png", image)[1].tobytes())
 

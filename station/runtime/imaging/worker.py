@@ -30,9 +30,6 @@ class VisionWorker:
 
     One thread does the work in the order of the calls, so a frame's measurement ahead always uses the same earlier step
     as its step's measurement.
-
-    Args:
-        golden: reference that every new one is compared with.
     """
 
     def __init__(self, golden: GoldenReference, settings: ReferenceSettings) -> None:
@@ -50,12 +47,9 @@ class VisionWorker:
     async def take_reference(
         self, frames: Sequence[Frame], segmentation: Segmentation
     ) -> tuple[Image, ReferenceProperties]:
-        """Check frames of the untouched gel, and measure against them from now on.
+        """Check frames, of one shape, of the untouched gel, and measure against them from now on.
 
         The first reference of a sensor becomes the golden one.
-
-        Args:
-            frames: of one shape.
 
         Returns:
             The reference, shape (height, width, 3), dtype uint8, BGR, and its properties.
@@ -84,19 +78,11 @@ class VisionWorker:
         await self._do(begin)
 
     async def follow(self, contact: Contact) -> None:
-        """Measure every later step as a step of one press, until the next press or reference.
-
-        Args:
-            contact: of the press's first step, against this reference.
-        """
+        """Measure every later step as one of the press with this first contact, until the next press or reference."""
         await self._do(lambda: self._referenced().follow(contact))
 
     def measure_ahead(self, frame: Frame) -> None:
-        """Start measuring one frame of the next step while more are captured; `measure` then has less to do.
-
-        Args:
-            frame: of the reference's shape.
-        """
+        """Start measuring one frame, of the reference's shape, of the next step; `measure` then has less to do."""
 
         def measure() -> None:
             if self._measurement is not None:
@@ -106,19 +92,11 @@ class VisionWorker:
             self._worker.submit(measure)
 
     async def measure(self, step: Step) -> MeasuredStep:
-        """Find the contact in a step's frames.
-
-        Args:
-            step: with frames of the reference's shape.
-        """
+        """Find the contact in a step's frames, which have the reference's shape."""
         return await self._do(lambda: self._referenced().measure(step))
 
     async def seek(self, step: Step) -> MeasuredStep:
-        """Measure a step of the approach, where only a firm contact counts.
-
-        Args:
-            step: with frames of the reference's shape.
-        """
+        """Measure a step of the approach, in the reference's shape, where only a firm contact counts."""
         return await self._do(lambda: self._referenced().seek(step))
 
     def _referenced(self) -> PressMeasurement:

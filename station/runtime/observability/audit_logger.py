@@ -21,11 +21,7 @@ log = logging.getLogger(__name__)
 
 
 class AuditLogger:
-    """Queue of audit entries. `note` never waits; no entry is dropped silently.
-
-    Args:
-        records: opened, or to be reopened.
-    """
+    """Queue of audit entries. `log` never waits; no entry is dropped silently."""
 
     def __init__(self, records: Records) -> None:
         self._records = records
@@ -46,9 +42,8 @@ class AuditLogger:
         """Queue the entry of a command that was carried out or refused.
 
         Args:
-            who: `plc`, `panel` or a person's name.
+            who: `plc`, `panel` or a person's name; also the role by default.
             why_not: reason of the refusal; None if it was carried out.
-            role: of `who`; by default the same as `who`.
             **old: values before the command, where they matter.
         """
         new = {"done": why_not is None} | ({} if why_not is None else {"why": str(why_not)})
@@ -84,12 +79,7 @@ class AuditLogger:
 
 
 def command_entry(command: Command, done: CommandDone, old: Any, by: tuple[str, str]) -> AuditEntry:
-    """Make the entry of a command that the PLC or a person gave.
-
-    Args:
-        old: the value before; None if unknown.
-        by: name and role of who gave it.
-    """
+    """Make the entry of a command by the name and role of who gave it; `old` is the value before, None if unknown."""
     new = {"argument": command.argument, "done": done.done, "why": str(done.why or "")}
     return AuditEntry(*by, f"command.{command.command}", "station", "", old, new)
 
@@ -107,13 +97,7 @@ def calibration_entry(who: str, reason: str, subject: str, old: Any, new: Any) -
 
 
 def verification_entry(who: str, subject: str, calibration: str, verification: str, *, passed: bool) -> AuditEntry:
-    """Make the entry of a verification.
-
-    Args:
-        subject: the verified thing, as `sensor D20966`.
-        calibration: id of the calibration compared with.
-        passed: all values were within their tolerances.
-    """
+    """Make the entry of a verification, of a subject as `sensor D20966`, against a calibration, by its id."""
     new = {"calibration": calibration, "verification": verification, "passed": passed}
     return AuditEntry(who, "service", "calibration.verified", subject, "", None, new)
 

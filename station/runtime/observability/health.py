@@ -36,11 +36,7 @@ class Liveness:
     """Watchdog: a name without progress for longer than allowed makes the station not live."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """Monitor no name yet.
-
-        Args:
-            clock: monotonic, s.
-        """
+        """Begin without any name to watch; the clock is monotonic, in s."""
         self._clock = clock
         self._within_s: dict[str, float] = {}
         self._last_s: dict[str, float] = {}
@@ -77,13 +73,7 @@ class HealthServer:
         readiness: Callable[[], Readiness],
         version: Mapping[str, str],
     ) -> None:
-        """Set what is served; the port is not open yet.
-
-        Args:
-            host: address or host name.
-            port: TCP; 0 takes a free one.
-            readiness: called at each /readyz; must not block.
-        """
+        """Set what is served; the port is not open yet, and 0 takes a free one. `readiness` must not block."""
         self._host = host
         self._port = port
         self._metrics = metrics

@@ -15,12 +15,7 @@ def log_fruit(
     explanation: Sequence[Message],
     areas_mm2: Sequence[float | None],
 ) -> None:
-    """Log one fruit in one line: sequence, fruit, curve as a sparkline, outcome, time, explanation.
-
-    Args:
-        fruit: the recipe's name.
-        areas_mm2: the curve, step by step.
-    """
+    """Log one fruit in one line: sequence, recipe's name, curve as a sparkline, outcome, time, explanation."""
     area = "no area" if outcome.area_mm2 is None else f"{outcome.area_mm2:.1f} mm²"
     if outcome.closing_mm is not None:
         area = f"{area} at {outcome.closing_mm:.1f} mm"

@@ -31,16 +31,11 @@ from station.runtime.observability.metrics_table import LABELS, OTHER, TABLE, Ro
 DEADLINE_SHARES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.25, 1.5, 2.0)
 
 
-class Metrics:
+class Metrics(Collector):
     """Counters and gauges of the station; every method is fast and never raises for a value."""
 
     def __init__(self, version: str, deadline_s: float, clock: Callable[[], float] = time.monotonic) -> None:
-        """Register everything in the table.
-
-        Args:
-            deadline_s: of one inspection; centre of the durations' buckets.
-            clock: monotonic, s.
-        """
+        """Register everything in the table; one inspection's deadline is the centre of the durations' buckets."""
         disable_created_metrics()  # an extra series for each counter, which is not needed
         self.registry = CollectorRegistry(auto_describe=False)
         ProcessCollector(registry=self.registry)
@@ -59,7 +54,7 @@ class Metrics:
         for key, row in TABLE.items():
             for values in () if row.at_scrape else row.known:
                 self._of(key, **dict(zip(row.labels, values, strict=True)))
-        self.registry.register(_AtScrape(self._at_scrape))
+        self.registry.register(self)
         self._made["build"].info(
             {"version": self._label("version", version), "python": self._label("python", platform.python_version())}
         )
@@ -71,12 +66,7 @@ class Metrics:
         phases_s: Mapping[str, float] | None = None,
         deadline_s: float | None = None,
     ) -> None:
-        """Count one inspection; call it when `Records.published` reports it for the first time.
-
-        Args:
-            fruit: the recipe's name, empty for none.
-            deadline_s: of this inspection, where it is still known.
-        """
+        """Count one inspection, when `Records.published` first reports it, with its deadline where it is known."""
         fruit = fruit or "none"
         reason = outcome.reasons[0] if outcome.reasons else "none"
         self._of("inspections", fruit=fruit, outcome=outcome.outcome, reason=reason).inc()
@@ -152,11 +142,7 @@ class Metrics:
         self._outbox = status
 
     def exposition(self, accept: str = "") -> tuple[bytes, str]:
-        """Return all metrics, and the content type.
-
-        Args:
-            accept: the client's `Accept` header; empty for Prometheus' text format.
-        """
+        """Return all metrics, and the content type, for an `Accept` header; empty for Prometheus' text format."""
         encode, content_type = choose_encoder(accept)
         return encode(self.registry), content_type
 
@@ -175,7 +161,7 @@ class Metrics:
         taken.add(str(value))
         return str(value)
 
-    def _at_scrape(self) -> Iterator[Metric]:
+    def collect(self) -> Iterator[Metric]:
         """Yield the metrics that are read at the scrape."""
         now_s = self._clock()
         ages = GaugeMetricFamily(TABLE["link_age"].name, TABLE["link_age"].help, labels=["link"])
@@ -195,14 +181,6 @@ class Metrics:
             yield from _of_records(self._status())
         if (told := self._outbox()) is not None:
             yield from _of_outbox(told)
-
-
-class _AtScrape(Collector):
-    def __init__(self, collect: Callable[[], Iterator[Metric]]) -> None:
-        self._collect = collect
-
-    def collect(self) -> Iterator[Metric]:
-        return self._collect()
 
 
 def _made(row: Row, around_deadline: tuple[float, ...], registry: CollectorRegistry) -> Any:

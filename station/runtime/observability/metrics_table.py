@@ -10,7 +10,8 @@ from station.channel.line import Reason, Refusal
 from station.devices.camera.interface import FrameFault
 from station.inspection.alarm_table import ALARMS
 from station.press.reference import ALARMS as REFERENCE_ALARMS
-from station.records import errors
+from station.records.errors import RecordsDeadlineError
+from station.records.writer import CONCERNING_ALL
 
 OTHER = "other"
 """Label value for a value that is not one of its own, or one too many."""
@@ -55,17 +56,7 @@ _MM2 = (1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0, 65.0, 80.0, 100.0, 13
 _MM = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 20.0)
 _PHASE_S = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
 
-_FAILURES = tuple(
-    (error.code,)
-    for error in (
-        errors.DiskFullError,
-        errors.ReadOnlyError,
-        errors.DiskError,
-        errors.LockedError,
-        errors.DamagedError,
-        errors.RecordsDeadlineError,
-    )
-)
+_FAILURES = tuple((error.code,) for error in (*CONCERNING_ALL, RecordsDeadlineError))
 
 TABLE: dict[str, Row] = {
     "inspections": Row(

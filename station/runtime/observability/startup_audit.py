@@ -20,10 +20,9 @@ _HIDDEN = ("password", "secret", "token", "pin")
 def start_entries(
     boot: str, configuration: Configuration, state_files: StateFiles, versions: Mapping[str, str], broken: str
 ) -> tuple[AuditEntry, ...]:
-    """Make the entries of a start, with the settings that changed since the previous start.
+    """Make the entries of a start, with the settings that changed since the last start, which the state files have.
 
     Args:
-        state_files: stores the configuration of the last start.
         broken: error of the configuration's file; its last good form is in force then.
     """
     key = state_files.read(_KEY)
@@ -44,11 +43,7 @@ def start_entries(
 
 
 def end_entry(boot: str, *, requested: bool) -> AuditEntry:
-    """Make the entry of an end.
-
-    Args:
-        requested: the end was requested, and is not caused by a failure.
-    """
+    """Make the entry of an end, which was requested or else caused by a failure."""
     return AuditEntry(STATION, STATION, "service.ended", "station", "", None, {"boot": boot, "asked": requested})
 
 

@@ -35,9 +35,6 @@ class Housekeeping:
     """One task beside the cycle.
 
     Args:
-        configuration: free disk space below which nothing is inspected, and the longest pause between two attempts.
-        production: what is recovered and watched; its recipes are read again, because people edit and approve them.
-        observability: gets this task's progress and findings.
         conditions: of alarms whose cause others watch; each returns the alarm's detail, None where it is not active.
         broken: error of the configuration at the start; None for none.
     """
@@ -105,27 +102,22 @@ class Housekeeping:
     async def _try_recovery(self) -> None:
         """Try to recover what is faulty, with growing pauses; its monitor reports why a recovery failed."""
         activate = (
-            self._service.makes_itself_ready and self._activation_is_lost and set(self._devices.faults) == {GRIPPER}
+            self._service.makes_itself_ready
+            and isinstance(self._devices.monitors[GRIPPER].fault, GripperNotActiveError | GripperFaultError)
+            and set(self._devices.faults) == {GRIPPER}
         )
         play = self._devices.needs_program_restart and not self._liveness.stuck()
         if time.monotonic() < self._again_s or not (activate or play or self._service.registry.fault is not None):
             return
         self._pause_s = min(2 * self._pause_s, self._longest_pause_s)
-        await self._reopen_records()
+        if self._service.registry.fault is not None:
+            await self._service.registry.reopen(reserve_bytes=self._reserve_mb * _MB)
         with contextlib.suppress(StationError):
             if activate:
                 await self._devices.activate_if_safe()
             elif play:
                 await self._devices.restart_program()
         self._again_s = time.monotonic() + self._pause_s
-
-    @property
-    def _activation_is_lost(self) -> bool:
-        return isinstance(self._devices.monitors[GRIPPER].fault, GripperNotActiveError | GripperFaultError)
-
-    async def _reopen_records(self) -> None:
-        if self._service.registry.fault is not None:
-            await self._service.registry.reopen(reserve_bytes=self._reserve_mb * _MB)
 
     def _update_alarms(self) -> None:
         service, alarms = self._service, self._service.alarms

@@ -15,11 +15,7 @@ log = logging.getLogger(__name__)
 
 
 class LotManager:
-    """Current lot. Its recipe is frozen when it begins: a later approval, edit or retirement affects the next lot.
-
-    Args:
-        service: inspects by the frozen recipe.
-    """
+    """Current lot. Its recipe is frozen when it begins: a later approval, edit or retirement affects the next lot."""
 
     def __init__(self, service: Service, recipes: ActiveRecipes, audit: AuditLogger) -> None:
         self._service, self._recipes, self._audit = service, recipes, audit
@@ -48,37 +44,22 @@ class LotManager:
         self._service.set_active(active)
 
     def choose(self, active: ActiveRecipe) -> bool:
-        """Set the recipe of the next lot; a lot under way continues with its own.
-
-        Returns:
-            Whether the choice is stored for a restart.
-        """
+        """Set the recipe of the next lot, and return whether it is stored; a lot under way continues with its own."""
         self.mismatch = None
         self._service.set_active(active)
         return self._recipes.store_active(active, self.lot)
 
     def lot_of(self, named_by_plc: str) -> str:
-        """Return the lot of a fruit.
-
-        Args:
-            named_by_plc: the lot as the PLC names it; may be empty.
-        """
+        """Return the lot of a fruit, for which the PLC's name may be empty."""
         self.plc_names = bool(named_by_plc)
         return named_by_plc or self.named
 
     def set_lot(self, lot: str) -> None:
-        """Start or end a lot for a person; the next fruit freezes the recipe in force again.
-
-        Args:
-            lot: its name; empty for none.
-        """
+        """Start a lot for a person, or end it by an empty name; the next fruit freezes the recipe in force again."""
         self.named, self.lot = lot, None
 
     async def begin(self, lot: str) -> bool:
-        """Begin a fruit of a lot. The first fruit of another lot freezes the active recipe's revision in force.
-
-        Args:
-            lot: its name, as the PLC gives it.
+        """Begin a fruit of the PLC's lot. The first fruit of another lot freezes the active recipe's revision in force.
 
         Returns:
             Whether it may be inspected; if not, `mismatch` is the reason.

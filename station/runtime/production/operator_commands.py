@@ -15,10 +15,10 @@ from station.inspection.states import State
 from station.messages import commands as messages
 from station.messages import lots
 from station.messages.message import Message, message_of
+from station.records.clock import utc_ms
 from station.records.errors import RecordsError
 from station.records.lots import end_lot, start_lot
 from station.records.records import Records
-from station.runtime.cycle.inspection import utc_ms
 from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import ARM, DeviceManager
 from station.runtime.observability.audit_logger import AuditLogger
@@ -49,13 +49,7 @@ _COMMANDS = {
 
 
 class OperatorCommands:
-    """Executes operators' commands.
-
-    Args:
-        plc_commands: executes commands that the PLC has too.
-        records: gets lots with a grower.
-        audit: gets the commands that `plc_commands` does not audit.
-    """
+    """Executes operators' commands; those that the PLC has too are executed, and audited, by `plc_commands`."""
 
     def __init__(
         self,
@@ -112,8 +106,9 @@ class OperatorCommands:
     async def start(self, request: OperatorCommand) -> OperatorCommandView:
         """Start a command, and wait a moment for its end."""
         same = next((each for each in self.recent if _under_way(each, request)), None)
-        if request.order is OperatorCommandName.STOP and not self._service.stopped_by_person:
-            same = None  # a Start has lifted the one under way, or it is not in force yet: once more does no harm
+        stopped = self._service.stopped_by_person
+        if request.order is (OperatorCommandName.START if stopped else OperatorCommandName.STOP):
+            same = None  # the other one has overtaken it, or it is not in force yet: once more does no harm
         entry = same or OperatorCommandView(
             ticket=next(self._tickets),
             order=request.order,

@@ -38,13 +38,7 @@ _ON_ALARMS = {CommandName.CLEAR_ALARMS: "acknowledged", CommandName.RESET: "rese
 
 
 class PlcCommands:
-    """Executes the PLC's commands, one after the other.
-
-    Args:
-        lots: gets a chosen recipe.
-        state_files: stores a person's stop for a restart.
-        observability: gets every command, and the line's signs of life.
-    """
+    """Executes the PLC's commands, one after the other; the state files store a person's stop for a restart."""
 
     def __init__(
         self,
@@ -61,10 +55,14 @@ class PlcCommands:
         self.mode = MODES[0]
         """PackML's: 1 production, 2 maintenance, 3 manual."""
         self.recipe_changing = False
-        self._manual_activity: Message | None = None
-        self._registers_wanted = False
-        self._registers: tuple[tuple[RegisterView, ...], float] = ((), 0.0)
-        self._line: Line | None = None
+        self.manual_activity: Message | None = None
+        """The activity at the panel during which the mode stays; None without one."""
+        self.registers_wanted = False
+        """The PLC interface's registers are wanted with its next beat."""
+        self.registers: tuple[tuple[RegisterView, ...], float] = ((), 0.0)
+        """The PLC's registers as last reported, and their monotonic time; none and 0 before the first report."""
+        self.last_report: Line | None = None
+        """The PLC interface's last message; None if there was none."""
         self._line_at_s: float | None = None
         self._turn = asyncio.Lock()
         self._stop_wanted = False
@@ -76,37 +74,18 @@ class PlcCommands:
         """Return the time since the PLC interface's last message; None if there was none."""
         return None if self._line_at_s is None else time.monotonic() - self._line_at_s
 
-    @property
-    def last_report(self) -> Line | None:
-        """Return the PLC interface's last message; None if there was none."""
-        return self._line
-
-    @property
-    def manual_activity(self) -> Message | None:
-        """Return the activity at the panel during which the mode stays; None without one."""
-        return self._manual_activity
-
     @contextlib.contextmanager
     def manual(self, activity: Message) -> Iterator[None]:
-        """Keep the mode unchanged while something is moved at the panel.
-
-        Args:
-            activity: for a person who wants another mode meanwhile.
-        """
-        self._manual_activity = activity
+        """Keep the mode unchanged while an activity at the panel moves something; a refused person reads which."""
+        self.manual_activity = activity
         try:
             yield
         finally:
-            self._manual_activity = None
-
-    @property
-    def registers_wanted(self) -> bool:
-        """Return whether the PLC interface's registers are wanted with its next beat."""
-        return self._registers_wanted
+            self.manual_activity = None
 
     def request_registers(self) -> None:
         """Request the PLC interface's registers with its next beat."""
-        self._registers_wanted = True
+        self.registers_wanted = True
 
     def restore_stop(self) -> None:
         """Restore a person's stop after a restart; it lasts until a reset."""
@@ -122,32 +101,27 @@ class PlcCommands:
 
     def set_line(self, line: Line) -> None:
         """Store the PLC interface's beat."""
-        self._line, self._line_at_s = line, time.monotonic()
+        self.last_report, self._line_at_s = line, time.monotonic()
         if line.registers:
-            self._registers, self._registers_wanted = (line.registers, time.monotonic()), False
+            self.registers, self.registers_wanted = (line.registers, time.monotonic()), False
         self._metrics.heard("plc_interface")
         self._metrics.waiting(line.waiting)
         if line.plc_alive:
             self._metrics.heard("plc")
 
-    @property
-    def registers(self) -> tuple[tuple[RegisterView, ...], float]:
-        """Return the PLC's registers as last reported, and their monotonic time; none and 0 before the first report."""
-        return self._registers
-
     def line_fault(self) -> Message | None:
         """Return the line's fault, as far as known."""
         age_s = self.line_age_s
-        if self._line is None or age_s is None:
+        if self.last_report is None or age_s is None:
             return None
         if age_s > LINE_SILENT_S:
             return operation.INTERFACE_SILENT(age_s=age_s)
-        beats = self._line.plc_alive or not self._line.enabled
+        beats = self.last_report.plc_alive or not self.last_report.enabled
         return None if beats else operation.HEARTBEAT_STILL()
 
     def update_line_alarms(self) -> None:
         """Raise and clear the alarms of the line's state."""
-        age_s, line, alarms = self.line_age_s, self._line, self._service.alarms
+        age_s, line, alarms = self.line_age_s, self.last_report, self._service.alarms
         if line is None or age_s is None:
             return
         silent = age_s > LINE_SILENT_S
@@ -158,11 +132,7 @@ class PlcCommands:
         alarms.update(AlarmId.CAN_NODE_LOST, faults.get("can"))
 
     async def execute(self, command: Command, by: tuple[str, str] = (PLC, PLC)) -> CommandDone:
-        """Execute one command.
-
-        Args:
-            by: name and role of who gave it.
-        """
+        """Execute one command by the name and role of who gave it."""
         log.info("%s (%s) orders %s %s", *by, command.command, command.argument)
         before, alarms = self._value_before(command.command), self._service.alarms.alarms
         async with self._turn:
@@ -210,8 +180,8 @@ class PlcCommands:
     def _set_mode(self, mode: int) -> Message | None:
         if mode not in MODES:
             return messages.MODE_UNKNOWN(mode=mode)
-        if self._manual_activity is not None and mode != self.mode:
-            return messages.MODE_KEPT(activity=self._manual_activity)
+        if self.manual_activity is not None and mode != self.mode:
+            return messages.MODE_KEPT(activity=self.manual_activity)
         self.mode = mode
         return None
 
@@ -234,9 +204,7 @@ class PlcCommands:
             log.info("recipe %s (%d) is active", found.recipe.name, found.recipe.plc_number)
         finally:
             self.recipe_changing = False
-        if not kept:
-            return messages.RECIPE_NOT_STORED(number=number)
-        return None
+        return None if kept else messages.RECIPE_NOT_STORED(number=number)
 
     def _recipe_unknown(self, number: int) -> Message:
         known = ", ".join(map(str, self._recipes.numbers))
@@ -261,16 +229,10 @@ class PlcCommands:
         reached = await service.runner.until(lambda state: state in WAITING or not service.stopped_by_person)
         if reached not in WAITING:
             return messages.STARTED_MEANWHILE()
-        if await storing:
-            return None
-        return messages.STOP_NOT_STORED()
+        return None if await storing else messages.STOP_NOT_STORED()
 
     async def recover(self, request: Recover, by: tuple[str, str] = (PANEL, PANEL)) -> CommandDone:
-        """Recover the arm after a stop that a person has checked; the station continues after a reset.
-
-        Args:
-            by: name and role of who gave it.
-        """
+        """Recover the arm after a stop that a person has checked; the station continues after a reset."""
         if STATES[self._service.state].refusal is Refusal.BUSY or self._service.state is State.RETREATING_READY:
             return CommandDone(done=False, why=messages.BUSY())
         log.info("a person at the cell asks for: %s", request.what)
@@ -307,6 +269,8 @@ class PlcCommands:
         self._stop_wanted = False
         service.allow()
         await self._store_stop()
+        if service.stopped_by_person:
+            return messages.STOPPED_MEANWHILE()
         if state in {State.IDLE, State.RETREATING_READY}:
             return None
         service.request_reset()
@@ -322,10 +286,20 @@ class PlcCommands:
                 return message_of(fault)
             if state is State.CARRIED:
                 service.runner.post(Event.PERSON_CONFIRMED, operation.RESET())
-        tried_s = time.monotonic()
+        return await self._until_ready()
+
+    async def _until_ready(self) -> Message | None:
+        """Wait for what a reset has begun; return why the station is not ready."""
+        service, tried_s = self._service, time.monotonic()
         reached = await service.runner.until(
-            lambda now: now is State.IDLE or (now is State.LATCHED and service.runner.entered_s > tried_s)
+            lambda now: (
+                service.stopped_by_person
+                or now is State.IDLE
+                or (now is State.LATCHED and service.runner.entered_s > tried_s)
+            )
         )
+        if service.stopped_by_person:
+            return messages.STOPPED_MEANWHILE()
         if reached is not State.IDLE:
             return self._activity()
         service.alarms.reset()

@@ -19,13 +19,7 @@ _DEVICES_DECIDE = {State.UNKNOWN, State.HELD}
 
 
 class Interlock:
-    """Interlock: checks everything that a trigger needs.
-
-    Args:
-        plc_commands: the mode, and a recipe change under way.
-        lots: why a lot cannot begin.
-        observability: this start of the station, and the progress of its tasks.
-    """
+    """Interlock: checks everything that a trigger needs."""
 
     def __init__(
         self,
@@ -130,8 +124,5 @@ class Interlock:
     def _trouble(self) -> Message | None:
         if self._service.state not in _DEVICES_DECIDE:
             return None
-        faults = [
-            *self._devices.faults.values(),
-            *([self._service.registry.fault] if self._service.registry.fault else []),
-        ]
-        return message_of(faults[0]) if faults else None
+        fault = next(iter(self._devices.faults.values()), self._service.registry.fault)
+        return None if fault is None else message_of(fault)

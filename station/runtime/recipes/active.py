@@ -53,14 +53,10 @@ class RestoredRecipe(NamedTuple):
 
 
 class ActiveRecipes:
-    """Recipes in force on this site.
+    """Recipes in force on this site, by the files of its folder or those shipped.
 
     Each is stored in the home folder too: if the history cannot be read, the stored one stays in force. A recipe whose
     file was removed is not in force any more; an edit of the file changes nothing, and `problems` reports it.
-
-    Args:
-        folder: the site's recipe files; None for those shipped.
-        state_files: stores the recipes in force and the active one.
     """
 
     def __init__(self, folder: Path | None, state_files: StateFiles) -> None:
@@ -157,14 +153,7 @@ class ActiveRecipes:
         return RestoredRecipe(active, lot) if whole and lot is not None else RestoredRecipe(current, None)
 
     def store_active(self, active: ActiveRecipe, lot: str | None) -> bool:
-        """Store the active recipe for the next start.
-
-        Args:
-            lot: the lot under way; None if none has begun with this recipe.
-
-        Returns:
-            Whether it was stored.
-        """
+        """Store the active recipe for the next start, with the lot under way, if any; return whether it was stored."""
         snapshot = active.snapshot
         told = {"lot": lot, "revision": snapshot.revision, "sha256": snapshot.sha256}
         return self._state_files.write(_ACTIVE, json.dumps({**told, "values": json.loads(snapshot.text)}).encode())

@@ -15,7 +15,6 @@ from station.calibration.report import calibration_files, verification_files
 from station.calibration.rig import Place, Progress, Unit
 from station.calibration.store import CalibrationStore
 from station.calibration.verification_procedure import VerificationProcedure
-from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (
     CalibrationRunView,
@@ -28,7 +27,7 @@ from station.channel.panel_maintenance_queries import (
     RunStep,
     StartCalibrationRun,
 )
-from station.channel.server import Handler
+from station.channel.server import Handlers
 from station.channel.worker import PanelWorker
 from station.errors import BadInputError, StationError
 from station.messages import calibration as messages
@@ -70,9 +69,6 @@ class PanelCalibration:
     """Requests about the calibration, and runs of the procedures of `station.calibration`.
 
     Args:
-        production: its devices close on the ball, in a mode that must not change during a run.
-        records: stores the audit entry and the result together.
-        audit: gets the start and the cancellation of runs.
         worker: reads and writes files in its thread.
         refusal: returns why nothing may be moved by hand now.
     """
@@ -90,10 +86,7 @@ class PanelCalibration:
         self._records, self._audit, self._worker, self._refusal = records, audit, worker, refusal
         self._store = CalibrationStore(configuration.home)
         self._run: _Run | None = None
-
-    def handlers(self) -> dict[type[ChannelMessage], Handler]:
-        """Return the handler of each request."""
-        return {
+        self.handlers: Handlers = {
             GetCalibration: self.state,
             StartCalibrationRun: self.begin,
             ContinueCalibrationRun: self.go_on,

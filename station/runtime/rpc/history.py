@@ -1,9 +1,8 @@
 """Requests of the pages that change lots, and that note exports."""
 
 from station.channel.line import Noted
-from station.channel.messages import ChannelMessage
 from station.channel.panel_queries import EndLot, LotView, NoteExport, StartLot
-from station.channel.server import Handler
+from station.channel.server import Handlers
 from station.records.audit import AuditEntry
 from station.records.lots import end_lot, start_lot
 from station.records.records import Records
@@ -14,10 +13,7 @@ class PanelHistory:
 
     def __init__(self, records: Records) -> None:
         self._records = records
-
-    def handlers(self) -> dict[type[ChannelMessage], Handler]:
-        """Return the handler of each request."""
-        return {
+        self.handlers: Handlers = {
             StartLot: self.start_lot,
             EndLot: self.end_lot,
             NoteExport: self.note_export,

@@ -35,11 +35,7 @@ class LogRing(logging.Handler):
         self._numbers.append(record.levelno)
 
     def last(self, number: int, level: str) -> tuple[LogLine, ...]:
-        """Return the newest lines, newest last.
-
-        Args:
-            level: name of the lowest level.
-        """
+        """Return the newest lines of a lowest level, by its name, newest last."""
         least = logging.getLevelNamesMapping()[level]
         chosen = [line for line, found in zip(self._lines, self._numbers, strict=True) if found >= least]
         return tuple(chosen[-number:])

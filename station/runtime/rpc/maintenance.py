@@ -7,7 +7,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (
     HISTOGRAM_BINS,
@@ -25,7 +24,7 @@ from station.channel.panel_maintenance_queries import (
     SetLeds,
 )
 from station.channel.panel_queries import Picture
-from station.channel.server import Handler
+from station.channel.server import Handlers
 from station.channel.worker import PanelWorker
 from station.devices.camera.interface import Frame, Image, Leds
 from station.errors import StationError
@@ -63,14 +62,11 @@ class NotNowError(StationError):
 
 
 class PanelMaintenance:
-    """Requests of the maintenance page.
+    """Requests of the maintenance page; every manual motion is audited.
 
     Args:
-        production: what is moved, watched and shown.
-        observability: gets every manual motion.
         home: folder of the golden reference of a sensor that is not calibrated.
         worker: makes pictures in its thread.
-        log: the last lines.
     """
 
     def __init__(
@@ -87,10 +83,7 @@ class PanelMaintenance:
         self._worker, self._log = worker, log
         self._moving = asyncio.Lock()
         self._method: tuple[object, Method] | None = None
-
-    def handlers(self) -> dict[type[ChannelMessage], Handler]:
-        """Return the handler of each request."""
-        return {
+        self.handlers: Handlers = {
             GetHealth: self.health,
             JogGripper: self.jog,
             SetLeds: self.set_leds,

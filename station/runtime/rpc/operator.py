@@ -27,10 +27,10 @@ from station.inspection.states import STATES
 from station.messages import operation as messages
 from station.messages.message import Message, message_of
 from station.records.audit import AuditEntry
+from station.records.clock import utc_ms
 from station.records.errors import RecordsError
 from station.records.records import Records
 from station.runtime.alarms.commands import AlarmCommands
-from station.runtime.cycle.inspection import utc_ms
 from station.runtime.observability.audit_logger import AuditLogger
 from station.runtime.production.operator_commands import OperatorCommands
 from station.runtime.production.production import Production
@@ -48,14 +48,7 @@ SILENT_S = 3.0
 
 
 class PanelServer:
-    """Channel server for the HMI.
-
-    Args:
-        production: what is shown and commanded.
-        records: gets lots.
-        alarms: alarm commands of people.
-        audit: gets what people do.
-    """
+    """Channel server for the HMI."""
 
     def __init__(
         self,

@@ -3,8 +3,7 @@
 import contextlib
 from typing import Self
 
-from station.channel.messages import ChannelMessage
-from station.channel.server import Handler
+from station.channel.server import Handlers
 from station.channel.worker import PanelWorker
 from station.records.records import Records
 from station.runtime.observability.observability import Observability
@@ -18,12 +17,7 @@ from station.settings.configuration import Configuration
 
 
 class PanelPages:
-    """Handlers of these pages; use them inside `async with`, and close before the devices.
-
-    Args:
-        production: what the pages show and move.
-        observability: gets everything that a person does.
-    """
+    """Handlers of these pages; use them inside `async with`, and close before the devices."""
 
     def __init__(
         self,
@@ -39,11 +33,11 @@ class PanelPages:
         self._ball = PanelCalibration(
             configuration, production, records, observability.audit, self._worker, maintenance.refusal
         )
-        self.handlers: dict[type[ChannelMessage], Handler] = {
-            **history.handlers(),
-            **recipes.handlers(),
-            **maintenance.handlers(),
-            **self._ball.handlers(),
+        self.handlers: Handlers = {
+            **history.handlers,
+            **recipes.handlers,
+            **maintenance.handlers,
+            **self._ball.handlers,
         }
         """Handler of each request."""
         self._open = contextlib.AsyncExitStack()

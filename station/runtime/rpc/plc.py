@@ -22,13 +22,7 @@ from station.vocabulary import Refusal
 
 
 class PlcInterfaceServer:
-    """Server for the PLC interface.
-
-    Args:
-        endpoint: bound when the server is made.
-        production: the cycle, its interlock, the lots and the PLC's commands.
-        alarms: alarm commands of people.
-    """
+    """Server for the PLC interface, on an endpoint that is bound when it is made."""
 
     def __init__(
         self,

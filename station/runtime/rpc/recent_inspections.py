@@ -69,13 +69,7 @@ class RecentInspections:
     def restore(
         self, short: Iterable[FruitSummary], full: Iterable[RestoredFruit], lots: Mapping[str, Mapping[str, int]]
     ) -> None:
-        """Restore the recent inspections of the previous start.
-
-        Args:
-            short: the last fruit, oldest first.
-            full: those of them that are known in full, oldest first.
-            lots: count of each outcome, by lot.
-        """
+        """Restore the recent inspections of the previous start, oldest first, and each lot's count of outcomes."""
         self._short.extend(short)
         self._by_sequence.update((each.fruit.short.sequence, _Recent(each.fruit, each.look)) for each in full)
         self._lots.update((name, Counter(counts)) for name, counts in lots.items())
@@ -107,11 +101,7 @@ class RecentInspections:
             counted.update([now.outcome])
 
     def counts(self, lot: str | None) -> Counts:
-        """Count a lot's outcomes; for fruit without a lot, since this start of the station.
-
-        Args:
-            lot: None for fruit without a lot.
-        """
+        """Count a lot's outcomes; for fruit without a lot, None, since this start of the station."""
         counted = self._lots.get(lot or "", Counter())
         return Counts(passed=counted["PASS"], failed=counted["FAIL"], unjudged=counted["NO_RESULT"])
 
@@ -151,12 +141,7 @@ class RecentInspections:
 def fruit_view(
     published: Outcome, record: InspectionRecord, recipe: Recipe, revision: str, deadline_s: float, picture: int | None
 ) -> Fruit:
-    """Make the page's view of a fruit.
-
-    Args:
-        record: the station's own result.
-        picture: step that has a picture.
-    """
+    """Make the page's view of a fruit from the station's own result, and the step that has a picture."""
     onset_mm = record.measures.get("onset_mm")
     points = [point for point in record.curve if point.closing_mm is not None and point.closing_mm >= 0]
     factor = limit_factor(record.measures)
@@ -190,12 +175,7 @@ def fruit_view(
 
 
 def short_view(published: Outcome, recipe: str, areas_mm2: Iterable[float | None]) -> FruitSummary:
-    """Make the view of a fruit in a list.
-
-    Args:
-        recipe: the recipe's name.
-        areas_mm2: of the steps since the contact onset.
-    """
+    """Make the view of a fruit in a list, by its recipe's name and the areas of the steps since the contact onset."""
     return FruitSummary(
         sequence=published.sequence,
         outcome=published.outcome,

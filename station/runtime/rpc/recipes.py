@@ -4,7 +4,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from station.channel.line import Noted
-from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
 from station.channel.panel_recipe_orders import (
     ApproveRecipe,
@@ -15,7 +14,7 @@ from station.channel.panel_recipe_orders import (
     SaveDraft,
     SubmitRecipe,
 )
-from station.channel.server import Handler
+from station.channel.server import Handlers
 from station.channel.worker import PanelWorker
 from station.errors import BadInputError
 from station.messages import recipes as messages
@@ -27,20 +26,12 @@ from station.recipe_store.store import RecipeStore
 
 
 class PanelRecipes:
-    """Changes of recipes.
-
-    Args:
-        folder: the site's recipe files; None for those shipped.
-        worker: runs what blocks.
-    """
+    """Changes of a site's recipe files, or of those shipped, in a worker's thread."""
 
     def __init__(self, home: Path, folder: Path | None, worker: PanelWorker) -> None:
         self._store, self._editor = RecipeStore(home, folder), RecipeEditor(home, folder)
         self._worker = worker
-
-    def handlers(self) -> dict[type[ChannelMessage], Handler]:
-        """Return the handler of each request."""
-        return {
+        self.handlers: Handlers = {
             SaveDraft: self.save_draft,
             SubmitRecipe: self.submit,
             ApproveRecipe: self.approve,

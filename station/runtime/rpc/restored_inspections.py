@@ -58,7 +58,6 @@ def read_recent(folder: Path, deadline_s: Callable[[Recipe], float]) -> Restored
     """Read the recent inspections, and the counts of their lots. Blocks for some tens of milliseconds.
 
     Args:
-        folder: of the records.
         deadline_s: returns the longest duration of an inspection by a recipe.
 
     Raises:

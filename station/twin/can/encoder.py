@@ -1,7 +1,7 @@
 """The line encoder: a CiA 406 node whose count follows the belt."""
 
 from station.settings.can import ENCODER_EDS, CanSettings
-from station.twin.can.faults import LineFault, gone
+from station.twin.can.faults import LineFault
 from station.twin.can.network import LoopNetwork
 from station.twin.can.node import TwinNode
 from station.twin.clock import Clock
@@ -16,13 +16,8 @@ class LineEncoder(TwinNode):
     """Counts through 32 bits and sends its count each time its event timer is over."""
 
     def __init__(self, settings: CanSettings, clock: Clock, faults: FaultBoard, first_count: int = 0) -> None:
-        """Make the encoder.
-
-        Args:
-            faults: the line's board.
-            first_count: what it counts from.
-        """
-        network = LoopNetwork(settings, lambda: gone(faults, clock, LineFault.ENCODER_SILENT))
+        """Make the encoder with the line's board; it counts from `first_count`."""
+        network = LoopNetwork(settings, lambda: faults.gone(clock.now_s(), LineFault.ENCODER_SILENT))
         super().__init__(network, settings.encoder_node, ENCODER_EDS)
         self._clock, self._faults = clock, faults
         self._way = float(first_count)

@@ -15,8 +15,7 @@ The common faults mean here, with the board's amount:
 
 from enum import StrEnum
 
-from station.twin.clock import Clock
-from station.twin.faults import CommonFault, FaultBoard
+from station.twin.faults import FaultBoard
 
 
 class LineFault(StrEnum):
@@ -45,16 +44,3 @@ class LineFault(StrEnum):
 def line_faults() -> FaultBoard:
     """A board with the common faults and the line's own, all off."""
     return FaultBoard("line", tuple(LineFault))
-
-
-def gone(faults: FaultBoard, clock: Clock, own: LineFault) -> bool:
-    """Whether a node is silent now.
-
-    Args:
-        clock: the time by which `intermittent` comes and goes.
-        own: the node's own fault of that kind.
-    """
-    if faults.active(CommonFault.OFF) or faults.active(own):
-        return True
-    period_s = faults.amount(CommonFault.INTERMITTENT)
-    return period_s > 0 and clock.now_s() % period_s >= period_s / 2

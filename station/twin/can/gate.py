@@ -7,7 +7,7 @@ from canopen.pdo.base import PdoMap
 from canopen.sdo.exceptions import SdoAbortedError
 
 from station.settings.can import GATE_EDS, CanSettings
-from station.twin.can.faults import LineFault, gone
+from station.twin.can.faults import LineFault
 from station.twin.can.network import LoopNetwork
 from station.twin.can.node import TwinNode
 from station.twin.clock import Clock
@@ -38,12 +38,8 @@ class RejectGate(TwinNode):
     """Eight flaps, eight places for orders."""
 
     def __init__(self, settings: CanSettings, clock: Clock, faults: FaultBoard) -> None:
-        """Make the gate.
-
-        Args:
-            faults: the line's board.
-        """
-        network = LoopNetwork(settings, lambda: gone(faults, clock, LineFault.GATE_SILENT))
+        """Make the gate with the line's board."""
+        network = LoopNetwork(settings, lambda: faults.gone(clock.now_s(), LineFault.GATE_SILENT))
         super().__init__(network, settings.gate_node, GATE_EDS)
         self._clock, self._faults = clock, faults
         self._armed: dict[int, Shot] = {}

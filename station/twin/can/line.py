@@ -21,12 +21,7 @@ class LineNodes:
     """Both nodes. The bus has to carry frames between them: they are two connections to it."""
 
     def __init__(self, settings: CanSettings, clock: Clock, faults: FaultBoard, first_count: int = 0) -> None:
-        """Make the nodes; nothing is opened before `start`.
-
-        Args:
-            faults: the switches, from `line_faults`.
-            first_count: what the encoder counts from.
-        """
+        """Make the nodes with the switches from `line_faults`; nothing is opened before `start`."""
         self._settings, self._clock, self._faults = settings, clock, faults
         self.encoder = LineEncoder(settings, clock, faults, first_count)
         self.gate = RejectGate(settings, clock, faults)

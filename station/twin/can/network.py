@@ -37,11 +37,7 @@ class LoopNetwork(canopen.Network):
     """canopen's network with its callbacks on the loop."""
 
     def __init__(self, settings: CanSettings, silent: Callable[[], bool]) -> None:
-        """Prepare; nothing is opened.
-
-        Args:
-            silent: whether nothing is sent or heard now.
-        """
+        """Prepare; nothing is opened. While `silent` says so, nothing is sent or heard."""
         super().__init__()
         self._settings, self._silent = settings, silent
 

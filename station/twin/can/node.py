@@ -14,13 +14,7 @@ class TwinNode:
     """A CANopen device on a network of its own."""
 
     def __init__(self, network: LoopNetwork, number: int, eds: Path) -> None:
-        """Make the node; nothing is sent before `boot`.
-
-        Args:
-            network: the node's connection to the bus.
-            number: its node id.
-            eds: its data sheet, from which its objects come.
-        """
+        """Make the node with the objects of its data sheet; nothing is sent before `boot`."""
         self.network = network
         self.number = number
         self.local = canopen.LocalNode(number, str(eds))
@@ -54,11 +48,7 @@ class TwinNode:
         self.local.set_data(index, subindex, value.to_bytes(size, "little"))
 
     def raise_error(self, code: int, register: int) -> None:
-        """Send an emergency once, and remember it in objects 1001 and 1003.
-
-        Args:
-            register: the error register's bits that go with it.
-        """
+        """Send an emergency once, with its bits of the error register, and remember it in objects 1001 and 1003."""
         if code in self._errors:
             return
         self._errors[code] = register

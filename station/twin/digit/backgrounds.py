@@ -20,11 +20,7 @@ _DUST = 6
 
 
 def cosine_basis(length: int, count: int) -> Array:
-    """The first cosines of the orthonormal DCT-II at a length.
-
-    Args:
-        length: samples.
-        count: cosines.
+    """The first `count` cosines of the orthonormal DCT-II at a length in samples.
 
     Returns:
         Shape (length, count), dtype float32; sampled so that coefficients do not depend on the length.
@@ -35,11 +31,7 @@ def cosine_basis(length: int, count: int) -> Array:
 
 
 def cosine_field(coefficients: Array, shape: tuple[int, int] = SENSOR_SHAPE) -> Array:
-    """Draw a field from its cosine coefficients.
-
-    Args:
-        coefficients: shape (3, rows, columns).
-        shape: rows and columns of the field.
+    """Draw a field of a shape (rows, columns) from its cosine coefficients, shape (3, rows, columns).
 
     Returns:
         Shape (*shape, 3), dtype float32.
@@ -50,11 +42,7 @@ def cosine_field(coefficients: Array, shape: tuple[int, int] = SENSOR_SHAPE) -> 
 
 
 def background(fitted: Fitted, unit: int | None) -> Array:
-    """The clean no-contact image of a sensor.
-
-    Args:
-        fitted: the numbers learned from real units.
-        unit: the unit's seed; None for the unit that the optical table was fitted on.
+    """The clean no-contact image of a unit, by its seed; None for the unit that the optical table was fitted on.
 
     Returns:
         Shape (640, 480, 3), dtype float32, grey levels, channels B, G, R.

@@ -26,11 +26,7 @@ class Speck(NamedTuple):
 
 
 def scattered(count: int, generator: np.random.Generator) -> list[Speck]:
-    """Specks of 0.5 to 1.5 mm anywhere on the gel.
-
-    Args:
-        generator: draws four numbers for each.
-    """
+    """Specks of 0.5 to 1.5 mm anywhere on the gel; four numbers are drawn for each."""
     rows, columns = GRID_SHAPE
     return [
         Speck(
@@ -47,9 +43,6 @@ def moved(specks: list[Speck], generator: np.random.Generator) -> list[Speck]:
     """The specks after something has brushed over the gel: some moved by 1 to 3 mm, some lost, some new.
 
     At least one speck is no longer where it was.
-
-    Args:
-        generator: decides about each.
     """
     now: list[Speck] = []
     for number, speck in enumerate(specks):
@@ -69,11 +62,7 @@ def moved(specks: list[Speck], generator: np.random.Generator) -> list[Speck]:
 
 
 def dent_of(specks: list[Speck]) -> FloatArray:
-    """The dents of the specks, shape (320, 240), mm.
-
-    Args:
-        specks: where they lie.
-    """
+    """The dents of the specks, shape (320, 240), mm."""
     dent = np.zeros(GRID_SHAPE, np.float32)
     for speck in specks:
         cv2.circle(dent, (speck.x, speck.y), speck.radius, speck.depth_mm, cv2.FILLED)

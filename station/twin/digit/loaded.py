@@ -65,11 +65,7 @@ class LoadedLight:
 
 
 def band_share(push_mm: float) -> float:
-    """Share of its end that a band has come to, 0 to 1: it rises at once and bends off.
-
-    Args:
-        push_mm: mean dent of the gel.
-    """
+    """Share of its end, 0 to 1, that a band has come to at a gel's mean dent, mm: it rises at once and bends off."""
     return float(-np.expm1(-((max(0.0, push_mm) / _PUSH_MM) ** _PUSH_POWER)))
 
 

@@ -38,12 +38,14 @@ def _banks(levels: tuple[float, ...], seed: int) -> tuple[list[Array], Mapping[s
     """Fields of pixel noise, and the state of the generator that has drawn them."""
     generator = np.random.default_rng([seed, 3])
     rows, columns = (side + _BANK_MARGIN for side in SENSOR_SHAPE)
-    mix = np.linalg.cholesky(_CHANNELS).T.astype(np.float32)
+    mix = np.linalg.cholesky(_CHANNELS)
     banks: list[Array] = []
     for _ in range(_BANKS):
-        white = generator.standard_normal((rows, columns, 3), np.float32) @ mix
+        # By OpenCV: numpy takes four times as long for sums and products along pixels of three channels.
+        white = cv2.transform(generator.standard_normal((rows, columns, 3), np.float32), mix)
         field = cv2.GaussianBlur(white, (0, 0), _BLUR_ACROSS_PX, sigmaY=_BLUR_DOWN_PX)
-        banks.append((field / field.std(axis=(0, 1)) * np.asarray(levels, np.float32)).astype(np.float32))
+        spread = cv2.meanStdDev(field)[1].ravel()
+        banks.append(np.asarray(cv2.transform(field, np.diag(np.divide(levels, spread))), np.float32))
     return banks, generator.bit_generator.state
 
 
@@ -93,11 +95,7 @@ class Drift:
         self.field = self._draw()
 
     def advance(self, now_s: float) -> bool:
-        """Go on to a time; whether the field has been drawn anew.
-
-        Args:
-            now_s: the twin's time.
-        """
+        """Go on to the twin's time; whether the field has been drawn anew."""
         if self._at_s is None:
             self._at_s = now_s
         passed_s = now_s - self._at_s

@@ -1,6 +1,7 @@
 """The DIGIT's image of a dented gel, with the sensor's own ills."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import cv2
@@ -72,10 +73,9 @@ class DigitSensor:
         drift: float = 1.0,
         mm_per_px: float = MM_PER_PX,
     ) -> None:
-        fitted = Fitted.load()
-        self._optics = Optics(fitted.table, fitted.smoothing_mm, mm_per_px * GRID_STEP)
+        fitted, self._optics = _fitted(), _optics(mm_per_px)
         self._background = background(fitted, unit)
-        levels = self._background.mean(axis=(0, 1)) / background(fitted, None).mean(axis=(0, 1))
+        levels = np.divide(cv2.mean(self._background)[:3], _fitted_levels())
         self._gain = np.clip(levels, *_GAIN_LIMITS).astype(np.float32)
         self._noise, self._noise_factor = FrameNoise(fitted.noise, seed), noise
         self._drift, self._drift_factor = Drift(fitted.noise, seed), drift
@@ -161,6 +161,23 @@ class DigitSensor:
             image += self._loaded.bands(dent, condition.bands)
         if condition.depth_shade:
             image += self._loaded.shade(dent, condition.depth_shade)
+
+
+# What all sensors have in common is made once: tests and benchmarks make hundreds of them in one process.
+@cache
+def _fitted() -> Fitted:
+    return Fitted.load()
+
+
+@cache
+def _optics(mm_per_px: float) -> Optics:
+    return Optics(_fitted().table, _fitted().smoothing_mm, mm_per_px * GRID_STEP)
+
+
+@cache
+def _fitted_levels() -> tuple[float, ...]:
+    """Mean grey level of each channel of the unit that the optics were fitted on, no contact."""
+    return tuple(cv2.mean(background(_fitted(), None))[:3])
 
 
 def _worn(wear: float) -> Array:

@@ -22,13 +22,7 @@ _LONGEST_HEADER = 4096
 
 
 def packed(kind: str, payload: bytes | memoryview = b"", **fields: float | str) -> bytes:
-    """One message.
-
-    Args:
-        kind: the header's kind.
-        payload: the bytes that follow it.
-        fields: the header's other entries.
-    """
+    """One message: its kind, the payload's bytes after the header, and the header's other entries."""
     header = json.dumps({"kind": kind, "bytes": len(payload), **fields}).encode()
     return _LENGTH.pack(len(header)) + header + payload
 

@@ -17,8 +17,7 @@ Codes: Robotiq 2F-85 manual, fault status register (gFLT).
 
 from enum import IntEnum, StrEnum
 
-from station.twin.clock import Clock
-from station.twin.faults import CommonFault, FaultBoard
+from station.twin.faults import FaultBoard
 
 
 class Code(IntEnum):
@@ -78,15 +77,3 @@ MINOR = {
 def gripper_faults() -> FaultBoard:
     """A board with the common faults and the gripper's own, all off."""
     return FaultBoard("gripper", tuple(GripperFault))
-
-
-def gone(faults: FaultBoard, clock: Clock) -> bool:
-    """Whether the gripper cannot be reached now.
-
-    Args:
-        clock: the time by which `intermittent` comes and goes.
-    """
-    if faults.active(CommonFault.OFF):
-        return True
-    period_s = faults.amount(CommonFault.INTERMITTENT)
-    return period_s > 0 and clock.now_s() % period_s >= period_s / 2

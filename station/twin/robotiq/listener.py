@@ -5,7 +5,6 @@ from abc import ABC, abstractmethod
 from contextlib import suppress
 
 from station.twin.faults import CommonFault, FaultBoard
-from station.twin.robotiq.faults import gone
 from station.twin.robotiq.model import RobotiqGripper
 
 GARBAGE = bytes.fromhex("ff00a55a0df3c3e1fe0a")
@@ -15,11 +14,7 @@ _LATEST_S = 60.0
 
 
 async def disturbed(answer: bytes, faults: FaultBoard) -> bytes:
-    """An answer as the faults `delayed` and `garbage` leave it.
-
-    Args:
-        answer: the bytes as they should be.
-    """
+    """An answer as the faults `delayed` and `garbage` leave it."""
     await asyncio.sleep(min(_LATEST_S, max(0.0, faults.amount(CommonFault.DELAYED))))
     return GARBAGE if faults.active(CommonFault.GARBAGE) else answer
 
@@ -60,7 +55,7 @@ class Listener(ABC):
 
     async def _watch(self) -> None:
         while True:
-            away = gone(self._gripper.faults, self._gripper.clock)
+            away = self._gripper.faults.gone(self._gripper.clock.now_s())
             if away and self._server:
                 await self._close()
             elif not away and not self._server:

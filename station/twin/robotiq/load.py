@@ -8,10 +8,7 @@ class Load(Protocol):
     """Something that pushes back on the fingers."""
 
     def force_N(self, opening_mm: float) -> float:  # noqa: N802 (the unit's symbol is a capital)
-        """Reaction force on one finger, 0 where nothing is touched.
-
-        Args:
-            opening_mm: distance between the gripper's own pads, 0 (closed) to 85 (open).
+        """Reaction force on one finger at an opening of the pads, 0 (closed) to 85 mm; 0 where nothing is touched.
 
         Returns:
             Newton; positive pushes the fingers apart and resists closing, negative resists opening.

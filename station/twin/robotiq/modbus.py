@@ -10,7 +10,6 @@ import tty
 from collections import deque
 from contextlib import suppress
 
-from station.twin.robotiq.faults import gone
 from station.twin.robotiq.listener import Listener, disturbed
 from station.twin.robotiq.model import RobotiqGripper
 from station.twin.robotiq.rtu import LONGEST_FRAME, RequestFramer, answer
@@ -71,7 +70,7 @@ class RtuSerialServer:
 
     def _readable(self, near: int) -> None:
         data = os.read(near, LONGEST_FRAME)
-        if gone(self._gripper.faults, self._gripper.clock):
+        if self._gripper.faults.gone(self._gripper.clock.now_s()):
             return
         self._requests.extend(self._framer.feed(data, asyncio.get_running_loop().time()))
         self._arrived.set()

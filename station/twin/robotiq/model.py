@@ -71,11 +71,7 @@ class RobotiqGripper:
         self._in_motion = False
 
     def opening_mm(self, now_s: float) -> float:
-        """The distance between the gripper's own pads.
-
-        Args:
-            now_s: the clock's time; a time already passed gives the latest opening.
-        """
+        """The distance between the gripper's own pads; a time already passed gives the latest opening."""
         self._advance(now_s)
         return self._opening_mm
 

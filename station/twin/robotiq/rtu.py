@@ -43,12 +43,7 @@ class RequestFramer:
         self._last_s = 0.0
 
     def feed(self, data: bytes, now_s: float) -> list[bytes]:
-        """Take bytes and return the whole frames without their CRC, in order.
-
-        Args:
-            data: what arrived.
-            now_s: monotonic time of arrival.
-        """
+        """Take bytes at their monotonic time of arrival; return the whole frames without their CRC, in order."""
         if now_s - self._last_s > _SILENCE_S:
             self._buffer = b""
         self._last_s = now_s
@@ -75,11 +70,7 @@ class RequestFramer:
 
 
 def answer(request: bytes, gripper: RobotiqGripper) -> bytes | None:
-    """The answer to a request, framed; None where a slave stays silent because another unit is meant.
-
-    Args:
-        request: unit, function and data, without CRC.
-    """
+    """The framed answer to a request without CRC; None where a slave stays silent because another unit is meant."""
     if request[0] != UNIT:
         return None
     function = request[1]

@@ -43,12 +43,7 @@ class Body:
         return not self.moving and self._now_s - self._resting_since_s >= REST_S
 
     def advance(self, now_s: float, scaling: float) -> None:
-        """Let time pass.
-
-        Args:
-            now_s: the clock's time.
-            scaling: the share of the commanded speed at which the arm goes, 0 to 1.
-        """
+        """Let time pass up to the clock's, at a share of the commanded speed, 0 to 1."""
         passed_s, self._now_s = now_s - self._now_s, now_s
         if self._path is None or self._profile is None:
             return
@@ -88,17 +83,11 @@ class Body:
 
     def brake(self, deceleration_rad_s2: float) -> None:
         """Come to rest on the path, the leading joint at a deceleration; nothing happens to an arm at rest."""
-        if self._path is None or self._speed == 0.0:
-            self._rest()
-            return
-        self._come_to_rest(max(map(abs, self.speeds_rad_s)) / deceleration_rad_s2)
+        self._come_to_rest(max(map(abs, self.speeds_rad_s)), deceleration_rad_s2)
 
     def brake_tool(self, deceleration_m_s2: float) -> None:
         """Come to rest on the path, the tool at a deceleration; nothing happens to an arm at rest."""
-        if self._path is None or self._speed == 0.0:
-            self._rest()
-            return
-        self._come_to_rest(math.hypot(*self.tool_speed()[:3]) / deceleration_m_s2)
+        self._come_to_rest(math.hypot(*self.tool_speed()[:3]), deceleration_m_s2)
 
     def tool_pose(self) -> Pose:
         """The tool centre point in the base's frame."""
@@ -131,8 +120,12 @@ class Body:
         """Whether each joint is a number and within its range either way."""
         return all(abs(q) <= self._joint_range_rad for q in joints_rad)
 
-    def _come_to_rest(self, duration_s: float) -> None:
-        self._profile = Braking(self._travel, self._speed, self._speed / max(duration_s, SHORTEST_BRAKING_S))
+    def _come_to_rest(self, pace: float, deceleration: float) -> None:
+        if self._path is None or self._speed == 0.0:
+            self._rest()
+            return
+        duration_s = max(pace / deceleration, SHORTEST_BRAKING_S)
+        self._profile = Braking(self._travel, self._speed, self._speed / duration_s)
         self._elapsed_s = 0.0
 
     def _begin(self, path: Path, profile: Profile) -> None:

@@ -5,10 +5,13 @@ exact words about the first 5 s of a protective stop are unverified on hardware.
 """
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-from station.twin.ur.interface import Controller
 from station.twin.ur.safety import SafetyMode
 from station.twin.ur.script import RuntimeState
+
+if TYPE_CHECKING:  # the controller makes these itself
+    from station.twin.ur.controller import UrController
 
 PORT = 29999
 BANNER = "Connected: Universal Robots Dashboard Server"
@@ -32,7 +35,7 @@ _WITH_ARGUMENT = {
 class Dashboard:
     """The answers, without a socket."""
 
-    def __init__(self, controller: Controller) -> None:
+    def __init__(self, controller: "UrController") -> None:
         self._controller = controller
         self._operational_mode = "NONE"
         safety, script = controller.safety, controller.script

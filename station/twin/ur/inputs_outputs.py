@@ -20,11 +20,7 @@ class InputsOutputs:
         self._voltage_bits = 0
 
     def write(self, written: Mapping[str, Any]) -> None:
-        """Set those outputs that a client's masks name.
-
-        Args:
-            written: a package's inputs by their names.
-        """
+        """Set those outputs that a client's masks name, by a package's inputs."""
         for group, first in DIGITAL_GROUPS.items():
             mask = written.get(f"{group}_digital_output_mask", 0) << first
             wanted = written.get(f"{group}_digital_output", 0) << first

@@ -34,11 +34,7 @@ JOINT_SPEED_LIMITS_RAD_S: Joints = (_SLOW, _SLOW, _FAST, _FAST, _FAST, _FAST)
 
 
 def link_transform(joint: int, angle_rad: npt.NDArray[np.float64] | float) -> Transform:
-    """Transform of one link after its joint was turned.
-
-    Args:
-        joint: 0 to 5.
-        angle_rad: any shape (...).
+    """Transform of the link of joint 0 to 5, turned by angles of any shape (...).
 
     Returns:
         Shape (..., 4, 4).
@@ -55,10 +51,7 @@ def link_transform(joint: int, angle_rad: npt.NDArray[np.float64] | float) -> Tr
 
 
 def forward(joints_rad: npt.ArrayLike) -> Transform:
-    """Transform from the base to the flange.
-
-    Args:
-        joints_rad: shape (..., 6).
+    """Transform from the base to the flange at joint positions, shape (..., 6).
 
     Returns:
         Shape (..., 4, 4).
@@ -71,14 +64,11 @@ def forward(joints_rad: npt.ArrayLike) -> Transform:
 
 
 def inverse(flange: Transform) -> npt.NDArray[np.float64]:
-    """All joint positions that bring the flange to a place, in closed form.
+    """All joint positions that bring the flange to places, base to flange, shape (n, 4, 4), in closed form.
 
     The geometry follows from the three parallel axes of shoulder, elbow and wrist 1: the base angle from the wrist's
     distance to the plane of the upper arm, wrist 2 from the tool's, and the rest is a triangle. Where wrist 2 is
     straight, wrist 3 is free and taken as 0.
-
-    Args:
-        flange: base to flange, shape (n, 4, 4).
 
     Returns:
         Shape (n, 8, 6), rad within -pi to pi; NaN where a branch has no solution.
@@ -113,11 +103,7 @@ def inverse(flange: Transform) -> npt.NDArray[np.float64]:
 
 
 def nearest(solutions: npt.NDArray[np.float64], near_rad: npt.ArrayLike) -> Joints | None:
-    """The solution nearest to given joint positions, whole turns within the joints' range included.
-
-    Args:
-        solutions: shape (8, 6), one element of what `inverse` returns.
-        near_rad: shape (6,).
+    """The one of `inverse`'s solutions, shape (8, 6), nearest to given joints, whole turns within their range included.
 
     Returns:
         None where no branch has a solution.

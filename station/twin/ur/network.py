@@ -2,10 +2,13 @@
 
 import asyncio
 import contextlib
+from typing import TYPE_CHECKING
 
 from station.twin.faults import CommonFault
 from station.twin.ur import dashboard, primary, rtde
-from station.twin.ur.interface import Controller
+
+if TYPE_CHECKING:  # the controller makes these itself
+    from station.twin.ur.controller import UrController
 
 SCRIPT_PORT = 30003
 LONGEST_LINE = 32768
@@ -16,7 +19,7 @@ GARBAGE_LINE = b"\xff\x00\x13 garbage\n"
 class Network:
     """The servers of one controller; they open, cut and close together."""
 
-    def __init__(self, controller: Controller) -> None:
+    def __init__(self, controller: "UrController") -> None:
         self._controller = controller
         self._servers: list[asyncio.Server] = []
         self._streams: dict[asyncio.Task[None], asyncio.StreamWriter] = {}

@@ -4,71 +4,64 @@ Names and types: RTDE guide, table "Robot controller outputs".
 """
 
 import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
-from station.twin.ur.interface import Controller, Getter
 from station.twin.ur.registers import COUNT
 from station.twin.ur.script import RuntimeState
 
+if TYPE_CHECKING:  # the controller makes these itself
+    from station.twin.ur.controller import UrController
+
+Getter = Callable[[], tuple[Any, ...]]
+"""Source of an RTDE output's value, one element for each of its numbers."""
 JOINT_RUNNING, JOINT_POWER_OFF = 253, 239
 _REGISTER = re.compile(r"(input|output)_(int|double|bit)_register_(\d{1,3})")
+_ZEROS = {
+    ("VECTOR6D", (0.0,) * 6): """
+        target_qdd target_current target_moment actual_current actual_current_window joint_control_output
+        actual_TCP_force ft_raw_wrench wrench_calc_from_currents payload_inertia
+    """,
+    ("VECTOR3D", (0.0,) * 3): "elbow_position elbow_velocity",
+    ("DOUBLE", (0.0,)): """
+        actual_momentum actual_robot_energy_consumed actual_robot_braking_energy_dissipated
+        standard_analog_input0 standard_analog_input1 euromap67_24V_voltage euromap67_24V_current
+        tool_analog_input0 tool_analog_input1 tcp_force_scalar joint_position_deviation_ratio
+        collision_detection_ratio
+    """,
+    ("UINT32", (0,)): "euromap67_input_bits euromap67_output_bits tool_analog_input_types script_control_line",
+    ("INT32", (0,)): "encoder0_raw encoder1_raw",
+}
+"""Names of outputs that read as zero, by their type and value."""
 _CONSTANT: dict[str, tuple[str, tuple[float, ...]]] = {
-    "target_qdd": ("VECTOR6D", (0.0,) * 6),
-    "target_current": ("VECTOR6D", (0.0,) * 6),
-    "target_moment": ("VECTOR6D", (0.0,) * 6),
-    "actual_current": ("VECTOR6D", (0.0,) * 6),
-    "actual_current_window": ("VECTOR6D", (0.0,) * 6),
-    "joint_control_output": ("VECTOR6D", (0.0,) * 6),
-    "actual_TCP_force": ("VECTOR6D", (0.0,) * 6),
+    **{name: zero for zero, names in _ZEROS.items() for name in names.split()},
     "actual_digital_input_bits": ("UINT64", (0,)),
     "joint_temperatures": ("VECTOR6D", (28.0,) * 6),
     "actual_execution_time": ("DOUBLE", (0.0005,)),
     "actual_tool_accelerometer": ("VECTOR3D", (0.0, 0.0, -9.82)),
-    "actual_momentum": ("DOUBLE", (0.0,)),
     "actual_main_voltage": ("DOUBLE", (48.0,)),
-    "actual_robot_energy_consumed": ("DOUBLE", (0.0,)),
-    "actual_robot_braking_energy_dissipated": ("DOUBLE", (0.0,)),
-    "encoder0_raw": ("INT32", (0,)),
-    "encoder1_raw": ("INT32", (0,)),
-    "elbow_position": ("VECTOR3D", (0.0,) * 3),
-    "elbow_velocity": ("VECTOR3D", (0.0,) * 3),
-    "standard_analog_input0": ("DOUBLE", (0.0,)),
-    "standard_analog_input1": ("DOUBLE", (0.0,)),
     "io_current": ("DOUBLE", (0.03,)),
-    "euromap67_input_bits": ("UINT32", (0,)),
-    "euromap67_output_bits": ("UINT32", (0,)),
-    "euromap67_24V_voltage": ("DOUBLE", (0.0,)),
-    "euromap67_24V_current": ("DOUBLE", (0.0,)),
     "tool_mode": ("UINT32", (253,)),
-    "tool_analog_input_types": ("UINT32", (0,)),
-    "tool_analog_input0": ("DOUBLE", (0.0,)),
-    "tool_analog_input1": ("DOUBLE", (0.0,)),
     "tool_output_voltage": ("INT32", (24,)),
     "tool_output_current": ("DOUBLE", (0.1,)),
     "tool_temperature": ("DOUBLE", (30.0,)),
     "tool_output_mode": ("UINT8", (0,)),
     "tool_digital_output0_mode": ("UINT8", (1,)),
     "tool_digital_output1_mode": ("UINT8", (1,)),
-    "tcp_force_scalar": ("DOUBLE", (0.0,)),
-    "joint_position_deviation_ratio": ("DOUBLE", (0.0,)),
-    "collision_detection_ratio": ("DOUBLE", (0.0,)),
     "time_scale_source": ("INT32", (-1,)),
     "target_gravity": ("VECTOR3D", (0.0, 0.0, 9.82)),
-    "script_control_line": ("UINT32", (0,)),
-    "ft_raw_wrench": ("VECTOR6D", (0.0,) * 6),
-    "wrench_calc_from_currents": ("VECTOR6D", (0.0,) * 6),
-    "payload_inertia": ("VECTOR6D", (0.0,) * 6),
 }
 """What the twin does not model: type, and a constant, believable value."""
 
 
-def output(controller: Controller, name: str) -> tuple[str, Getter] | None:
+def output(controller: "UrController", name: str) -> tuple[str, Getter] | None:
     """RTDE type and source of an output; None where this version of the controller has none of that name."""
     if (match := _REGISTER.fullmatch(name)) is not None:
         return _register(controller, name, match[1], match[2], int(match[3]))
     return controller.outputs.get(name)
 
 
-def _register(controller: Controller, name: str, way: str, kind: str, number: int) -> tuple[str, Getter] | None:
+def _register(controller: "UrController", name: str, way: str, kind: str, number: int) -> tuple[str, Getter] | None:
     """Return the type and source of one register; an input is read back as it was written."""
     registers = controller.registers
     if not (64 <= number <= 127 if kind == "bit" else number < COUNT):
@@ -82,7 +75,7 @@ def _register(controller: Controller, name: str, way: str, kind: str, number: in
     return rtde_type, lambda: (values[number],)
 
 
-def output_table(controller: Controller) -> dict[str, tuple[str, Getter]]:
+def output_table(controller: "UrController") -> dict[str, tuple[str, Getter]]:
     """Every output but the registers, by name: its RTDE type and its source."""
     body, safety, script = controller.body, controller.safety, controller.script
 

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -16,19 +15,6 @@ JUMP_RAD = 0.5
 
 class UnreachableError(Exception):
     """The arm cannot go there, or not on this way."""
-
-
-class Path(Protocol):
-    """A way of a length, in rad of the leading joint or in m of the tool."""
-
-    @property
-    def length(self) -> float:
-        """How long it is."""
-        ...
-
-    def at(self, travel: float) -> tuple[Joints, Joints]:
-        """Joint positions in rad and their slopes (rad per unit of length) after a travel."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,16 +40,7 @@ class JointPath:
 
     def at(self, travel: float) -> tuple[Joints, Joints]:
         """Joint positions and slopes after a travel in rad."""
-        a, b = self.start, self.slope
-        here = (
-            a[0] + b[0] * travel,
-            a[1] + b[1] * travel,
-            a[2] + b[2] * travel,
-            a[3] + b[3] * travel,
-            a[4] + b[4] * travel,
-            a[5] + b[5] * travel,
-        )
-        return here, b
+        return _along(self.start, self.slope, travel), self.slope
 
 
 class ToolPath:
@@ -73,12 +50,7 @@ class ToolPath:
     """
 
     def __init__(self, start_joints: Joints, start: Transform, end: Transform) -> None:
-        """Solve the way.
-
-        Args:
-            start_joints: where the arm stands.
-            start: the flange there, shape (4, 4).
-            end: where it has to go, shape (4, 4).
+        """Solve the way from joint positions and the flange there to where it has to go, both shape (4, 4).
 
         Raises:
             UnreachableError: part of the way is out of reach or leads through a singularity.
@@ -111,15 +83,17 @@ class ToolPath:
         rest = travel - piece * self._piece
         a, b = self._joints[piece], self._joints[piece + 1]
         s1, s2, s3, s4, s5, s6 = ((y - x) / self._piece for x, y in zip(a, b, strict=True))
-        here = (
-            a[0] + s1 * rest,
-            a[1] + s2 * rest,
-            a[2] + s3 * rest,
-            a[3] + s4 * rest,
-            a[4] + s5 * rest,
-            a[5] + s6 * rest,
-        )
-        return here, (s1, s2, s3, s4, s5, s6)
+        slope = s1, s2, s3, s4, s5, s6
+        return _along(a, slope, rest), slope
+
+
+Path = JointPath | ToolPath
+"""A way of a length, in rad of the leading joint or in m of the tool; its slopes are in rad per unit of length."""
+
+
+def _along(start: Joints, slope: Joints, travel: float) -> Joints:
+    q1, q2, q3, q4, q5, q6 = (q + s * travel for q, s in zip(start, slope, strict=True))
+    return q1, q2, q3, q4, q5, q6
 
 
 def _follow(start_joints: Joints, solutions: np.ndarray) -> list[Joints]:

@@ -13,14 +13,7 @@ Pose = tuple[float, float, float, float, float, float]
 
 
 def rotation_from_vector(vector: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Rotation matrix of a rotation vector (Rodrigues' formula).
-
-    Args:
-        vector: shape (3,), rad.
-
-    Returns:
-        Shape (3, 3), dtype float64.
-    """
+    """Rotation matrix, shape (3, 3), dtype float64, of a rotation vector, shape (3,), rad (Rodrigues' formula)."""
     angle = float(np.linalg.norm(vector))
     if angle < 1e-12:
         return np.eye(3)
@@ -30,14 +23,7 @@ def rotation_from_vector(vector: npt.NDArray[np.float64]) -> npt.NDArray[np.floa
 
 
 def vector_from_rotation(rotation: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Rotation vector of a rotation matrix, by way of the unit quaternion: safe near 0 and near pi.
-
-    Args:
-        rotation: shape (3, 3).
-
-    Returns:
-        Shape (3,), rad, of a length between 0 and pi.
-    """
+    """Rotation vector, shape (3,), 0 to pi rad, of a matrix, (3, 3), by the unit quaternion: safe near 0 and pi."""
     r = rotation.tolist()
     # Shepperd's method: of the four squared components, the largest is taken first.
     squares = (

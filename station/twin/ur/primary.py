@@ -4,10 +4,13 @@ Source: Universal Robots, "Client interfaces": version message (type 20, 3), rob
 """
 
 import struct
+from typing import TYPE_CHECKING
 
-from station.twin.ur.interface import Controller
 from station.twin.ur.safety import SafetyMode
 from station.twin.ur.script import RuntimeState
+
+if TYPE_CHECKING:  # the controller makes these itself
+    from station.twin.ur.controller import UrController
 
 PORT = 30001
 PERIOD_S = 0.1
@@ -18,7 +21,7 @@ VERSION = struct.Struct(f">iBQbbb{len(PROJECT)}sBBii{len(BUILT)}s")
 ROBOT_MODE = struct.Struct(">iBiBQ7?BBdddB")
 
 
-def version_message(controller: Controller) -> bytes:
+def version_message(controller: "UrController") -> bytes:
     """The message that opens the stream."""
     major, minor, bugfix, build = controller.version
     return VERSION.pack(
@@ -26,7 +29,7 @@ def version_message(controller: Controller) -> bytes:
     )
 
 
-def robot_mode_message(controller: Controller) -> bytes:
+def robot_mode_message(controller: "UrController") -> bytes:
     """A robot state message that holds the robot mode data alone."""
     safety, script = controller.safety, controller.script
     return ROBOT_MODE.pack(

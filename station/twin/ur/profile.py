@@ -2,20 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
-
-
-class Profile(Protocol):
-    """Travel over time along a path, in the path's own unit (rad of the leading joint, or m of the tool)."""
-
-    @property
-    def duration_s(self) -> float:
-        """Time until the motion rests."""
-        ...
-
-    def at(self, elapsed_s: float) -> tuple[float, float]:
-        """Travel and speed after a time, which is taken as within 0 and the duration."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,3 +64,7 @@ class Braking:
         """Travel, counted from the path's beginning, and speed after a time."""
         t = min(max(elapsed_s, 0.0), self.duration_s)
         return self.start + self.speed * t - 0.5 * self.deceleration * t**2, self.speed - self.deceleration * t
+
+
+Profile = Trapezoid | Braking
+"""Travel over time along a path, in the path's own unit (rad of the leading joint, or m of the tool)."""

@@ -8,12 +8,14 @@ import math
 import random
 import socket
 import struct
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from station.twin.faults import CommonFault
-from station.twin.ur.interface import Controller, Getter
-from station.twin.ur.outputs import output
+from station.twin.ur.outputs import Getter, output
 from station.twin.ur.registers import TYPE_CODES, input_type
+
+if TYPE_CHECKING:  # the controller makes these itself
+    from station.twin.ur.controller import UrController
 
 PORT = 30004
 FREQUENCY_HZ = 500.0
@@ -71,13 +73,9 @@ class InputRecipe:
 
 
 class RtdeConnection(asyncio.Protocol):
-    """One client.
+    """One client, in `connections` while it is connected."""
 
-    Args:
-        connections: holds this client while it is connected.
-    """
-
-    def __init__(self, controller: Controller, connections: "set[RtdeConnection]") -> None:
+    def __init__(self, controller: "UrController", connections: "set[RtdeConnection]") -> None:
         self._controller, self._connections = controller, connections
         self._buffer = bytearray()
         self._transport: asyncio.Transport | None = None

@@ -56,8 +56,8 @@ class ControlScript:
         self._commands: dict[int, Callable[[], Callable[[], bool] | None]] = {
             1: lambda: self._move(self._start_joint_move),
             2: lambda: self._move(self._start_pose_move),
-            3: lambda: self._move(self._start_tool_move),
-            4: lambda: self._move(self._start_tool_move_to_joints),
+            3: lambda: self._move(lambda: self._move_tool(self._pose())),
+            4: lambda: self._move(lambda: self._move_tool(self._body.forward(self._joints(), self._body.tcp_offset))),
             17: self._set_payload,
             26: lambda: self._answer(0.002),
             27: lambda: self._answer(*self._body.joints_rad),
@@ -103,11 +103,7 @@ class ControlScript:
         self._body.brake(SAFETY_BRAKE_RAD_S2)
 
     def stood_still(self, now_s: float) -> None:
-        """The controller itself did nothing for a while: what it has not read yet is no silence of the station.
-
-        Args:
-            now_s: the twin's time.
-        """
+        """The controller itself did nothing for a while: what it has not read yet is no silence of the station."""
         self._watched_since_s = max(self._watched_since_s, now_s)
 
     def step(self, now_s: float) -> None:
@@ -200,12 +196,6 @@ class ControlScript:
         if joints is None:
             raise ScriptEndError("the script failed: get_inverse_kin found no solution")
         self._body.move_joints(joints, speed, acceleration)
-
-    def _start_tool_move(self) -> None:
-        self._move_tool(self._pose())
-
-    def _start_tool_move_to_joints(self) -> None:
-        self._move_tool(self._body.forward(self._joints(), self._body.tcp_offset))
 
     def _move_tool(self, pose: Pose) -> None:
         speed, acceleration = self._registers.input_doubles(6, 2)
