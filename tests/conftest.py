@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import functools
+import gc
 import os
 import shutil
 import signal
@@ -18,12 +19,15 @@ from typing import Any, NamedTuple
 
 import psutil
 import pytest
+import pytest_timeout
 from hypothesis import HealthCheck, settings
 from threadpoolctl import threadpool_limits
 
 from station.cli import main
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
+KEPT = tuple(Path(__file__).parent / folder for folder in ("hmi_pages", "hmi"))
+"""Folders for which a whole station is kept running."""
 GRACE_S = 3.0
 
 settings.register_profile("busy machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -41,13 +45,34 @@ def pytest_configure() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_collection() -> None:
+    """Leave all that is imported out of the garbage collector's rounds, which cost a tenth of the tests' time."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Collect what the tests leave."""
+    gc.freeze()
+    gc.enable()
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep a folder's tests together, in whatever order they are: whole stations are kept running for some folders."""
+    """Keep a folder's tests together, in whatever order they are, and begin a worker's share with a folder of `KEPT`.
+
+    A worker's share begins so many items after the one before (xdist's `worksteal`), and others take from its end: the
+    folder's tests stay with one worker, which starts their station once.
+    """
     order: dict[Path, int] = {}
     for item in items:
         order.setdefault(item.path.parent, len(order))
     items.sort(key=lambda item: order[item.path.parent])
+    workers, count = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")), len(items)
+    for number, folder in enumerate(KEPT):
+        tests = [item for item in items if item.path.parent == folder]
+        items[:] = [item for item in items if item.path.parent != folder]
+        begin = number * count // workers
+        items[begin:begin] = tests
 
 
 def _remember_tasks() -> None:
@@ -63,6 +88,32 @@ def _remember_tasks() -> None:
 
 
 _remember_tasks()
+
+
+def _awaited(task: asyncio.Task[Any]) -> Iterator[str]:
+    """Where a task waits, from its own line down to the innermost."""
+    waiting: Any = task.get_coro()
+    while waiting is not None:
+        frame = getattr(waiting, "cr_frame", None) or getattr(waiting, "gi_frame", None)
+        if frame is not None:
+            yield f"  {frame.f_code.co_filename}:{frame.f_lineno} {frame.f_code.co_name}\n"
+        waiting = getattr(waiting, "cr_await", None) or getattr(waiting, "gi_yieldfrom", None)
+
+
+def _tell_tasks_of_a_timeout() -> None:
+    """Have a test that takes too long say where its tasks wait, beside its threads."""
+    threads_alone = pytest_timeout.dump_stacks
+
+    def dump_stacks(terminal: Any) -> None:
+        threads_alone(terminal)
+        for task in [task for reference in list(_TASKS) if (task := reference()) is not None and not task.done()]:
+            terminal.sep("~", title=f"Task {task.get_name()}")
+            terminal.write("".join(_awaited(task)))
+
+    pytest_timeout.dump_stacks = dump_stacks
+
+
+_tell_tasks_of_a_timeout()
 
 
 def _has_children() -> bool:

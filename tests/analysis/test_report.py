@@ -6,23 +6,14 @@ from urllib.parse import unquote, urlsplit
 import pytest
 from playwright.sync_api import sync_playwright
 
-ARGUMENTS = (
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--proxy-server=127.0.0.1:9",
-)
+from tests.chromium import ARGUMENTS
 
 
 @pytest.fixture
 def page(chromium):
     """A page of a headless browser, which ends with the test."""
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=list(ARGUMENTS))
+        browser = playwright.chromium.launch(executable_path=chromium, args=[*ARGUMENTS, "--proxy-server=127.0.0.1:9"])
         yield browser.new_page()
         browser.close()
 

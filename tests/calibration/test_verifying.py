@@ -14,7 +14,7 @@ from station.press.reference import take_reference
 from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import find_recipe
 from station.twin.digit.sensor import Condition
-from station.vision.methods import median_image
+from station.vision.median import median_image
 
 
 def verified(ball, draft, tell=lambda _progress: None):

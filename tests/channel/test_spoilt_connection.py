@@ -27,10 +27,9 @@ def test_a_connection_that_was_spoilt_is_made_anew(
         writers: list[tuple[asyncio.StreamWriter, asyncio.StreamWriter]] = []
 
         async def carry(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            with contextlib.suppress(OSError):
+            with contextlib.closing(writer), contextlib.suppress(OSError):
                 while data := await reader.read(4096):
                     writer.write(data)
-            writer.close()
 
         async def relay(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
             far_reader, far_writer = await asyncio.open_connection("127.0.0.1", behind)

@@ -1,10 +1,11 @@
 """The summary of the benchmarks: its figures are those of the pages, and none is read from the wrong row."""
 
+import contextlib
 import json
 
 import pytest
 
-from benchmarks import runner, summary
+from benchmarks import against, runner, summary
 
 PAGE = """
 | server | clients | p99 |
@@ -82,3 +83,65 @@ def test_the_list_says_how_long_each_took(benches, capsys):
     assert "long" in lines[0]
     assert "0.0 min  What one does." in lines[1]
     assert runner.main(["four"]) == 2
+
+
+def test_the_page_of_earlier_revisions_is_what_was_found():
+    assert against.DOCUMENT.read_text("utf-8") == against.markdown(against.read())
+
+
+@pytest.fixture
+def revisions(tmp_path, monkeypatch):
+    """Two checkouts with a benchmark that counts its runs into its page; the earlier one has no second figure."""
+    shared = tmp_path / "runs"
+    shared.write_text("")
+    for place, row in ("earlier", ""), ("now", "| ours, new | {at} |\\n"):
+        source = (
+            "import pathlib\n"
+            f"runs = pathlib.Path({str(shared)!r})\n"
+            f"runs.write_text(runs.read_text() + {place[0]!r})\n"
+            "at = len(runs.read_text())\n"
+            f"page = pathlib.Path('{tmp_path}/{place}/docs/page.md')\n"
+            f"page.write_text(f'| | ms |\\n|---|---|\\n| ours | {{at}} |\\n{row}')\n"
+        )
+        for folder in "benchmarks", "docs":
+            (tmp_path / place / folder).mkdir(parents=True)
+        (tmp_path / place / "benchmarks" / "bench_one.py").write_text(source)
+        (tmp_path / place / "docs" / "page.md").write_text("| | ms |\n|---|---|\n| ours | 0 |\n| ours, new | 0 |\n")
+    figures = [["time, ms", "ms", "ours |"], ["new time, ms", "ms", "ours, new"]]
+    for module in against, runner, summary:
+        monkeypatch.setattr(module, "BENCHMARKS", {"one": {"page": "page.md", "figures": figures}})
+    for module in against, summary:
+        monkeypatch.setattr(module, "ROOT", tmp_path / "now")
+    monkeypatch.setattr(runner, "FOLDER", tmp_path / "now" / "benchmarks")
+    monkeypatch.setattr(summary, "RUNS", tmp_path / "runs.json")
+    monkeypatch.setattr(summary, "DOCUMENT", tmp_path / "benchmarks.md")
+    monkeypatch.setattr(against, "FOUND", tmp_path / "found.json")
+    monkeypatch.setattr(against, "DOCUMENT", tmp_path / "page.md")
+    monkeypatch.setattr(against, "checked_out", lambda _: contextlib.nullcontext(tmp_path / "earlier"))
+    return shared
+
+
+def test_two_revisions_run_in_turn_and_only_what_both_have_is_compared(revisions):
+    assert runner.main(["--against", "v1", "one"]) == 0
+    assert against.DOCUMENT.read_text().splitlines()[-1] == "| `one` | v1 | time, ms | 1 | 2 |"
+    assert runner.main(["--against", "v1", "one"]) == 0
+    assert revisions.read_text() == "enne"
+    assert against.DOCUMENT.read_text().splitlines()[-1] == "| `one` | v1 | time, ms | 1; 4 | 2; 3 |"
+    assert runner.main(["--against", "v2", "one"]) == 0
+    assert against.DOCUMENT.read_text().splitlines()[-1] == "| `one` | v2 | time, ms | 5 | 6 |"
+
+
+def test_the_run_of_now_is_noted_as_any_other(revisions):
+    assert runner.main(["--against", "v1", "one"]) == 0
+    assert list(summary.read_runs()) == ["one"]
+    assert "| [one](page.md) | time, ms | 2 |" in summary.DOCUMENT.read_text()
+
+
+def test_a_benchmark_that_fails_ends_the_comparison_and_changes_no_page(revisions, tmp_path):
+    (tmp_path / "now" / "benchmarks" / "bench_one.py").write_text("raise SystemExit(3)")
+    assert runner.main(["--against", "v1", "one"]) == 1
+    assert not against.DOCUMENT.exists()
+
+
+def test_a_comparison_without_a_benchmark_is_refused(revisions):
+    assert runner.main(["--against", "v1"]) == runner.main(["--against", "v1", "two"]) == 2

@@ -77,6 +77,8 @@ def problem(words, root, *, whole):
     if words[0] == "./run":
         if words[1:2] and words[1] not in run_commands(root):
             return f"./run has no {' '.join(words[1:2])}"
+        if words[1:3] == ["bench", "--against"]:
+            words = ["./run", "bench", *words[4:]]
         if words[1:2] == ["bench"] and len(words) > 2 and not PLACEHOLDER.match(words[2]):
             return None if (root / "benchmarks" / f"bench_{words[2]}.py").exists() else f"no benchmark {words[2]}"
         if words[1:2] not in (["station"], ["demo"]) or words[2:3] == ["ARGS"]:

@@ -11,6 +11,7 @@ from hmi.recipes.form import field_texts
 from hmi.web.text import texts
 from hmi.web.translation import Locale, page_renderer
 from station.settings.hmi import LANGUAGES
+from tests.chromium import ARGUMENTS
 
 STYLE = Path(__file__).with_name("print.css")
 PAGE = re.compile(rb"/Type\s*/Page\b")
@@ -29,7 +30,7 @@ def printed(chromium, pages, tmp_path):
         html, pdf = tmp_path / "page.html", tmp_path / "page.pdf"
         base = f'<base href="{page.path.parent.as_uri()}/">'
         html.write_text(f"<!doctype html><meta charset=utf-8>{base}<style>{STYLE.read_text()}</style>{body}", "utf-8")
-        command = [chromium, "--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer"]
+        command = [chromium, *ARGUMENTS, "--no-pdf-header-footer"]
         command += [f"--user-data-dir={tmp_path / 'browser'}", f"--print-to-pdf={pdf}", html.as_uri()]
         subprocess.run(command, check=True, capture_output=True, timeout=300)
         return len(PAGE.findall(pdf.read_bytes()))

@@ -49,6 +49,7 @@ from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
 from station.settings.recipe import load_recipes
 from station.twin.console import ask as ask_twin
+from tests.chromium import ARGUMENTS
 from tests.hosts import fresh_host
 
 PATIENCE_S = 60.0
@@ -71,18 +72,6 @@ while process.poll() is None:
 """
 """Keeps a program for these tests and ends it with them, apart from their own processes: what it starts anew while a
 test goes on is none of that test's."""
-BROWSER_ARGUMENTS = (
-    "--headless=new",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    # A connection made while the first window is still being opened once waited 30 s for it in vain.
-    "--no-startup-window",
-)
 
 
 def eventually(what: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
@@ -311,7 +300,8 @@ def browser(cell: Cell, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Br
         pytest.skip("chromium is missing on this machine")
     folder, port = tmp_path_factory.mktemp("browser"), free_ports(1)[0]
     profile, log = f"--user-data-dir={folder / 'profile'}", folder / "chromium.log"
-    command = [path, *BROWSER_ARGUMENTS, profile, f"--remote-debugging-port={port}"]
+    # A connection made while the first window is still being opened once waited 30 s for it in vain.
+    command = [path, *ARGUMENTS, "--no-startup-window", profile, f"--remote-debugging-port={port}"]
     with begun(command, log, cell.environment) as chromium:
         eventually(lambda: said(log, "DevTools listening", chromium))
         with sync_playwright() as playwright:

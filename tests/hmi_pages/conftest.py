@@ -49,6 +49,7 @@ from station.settings.recipe import recipe_files
 from station.settings.recipe_text import with_values
 from station.twin.console import ask
 from station.vocabulary import Reason
+from tests.chromium import ARGUMENTS
 from tests.hosts import fresh_host
 
 PATIENCE_S = 120.0
@@ -320,7 +321,7 @@ def browser() -> Iterator[Browser]:
         pytest.skip("chromium is missing on this machine")
     expect.set_options(timeout=1000 * PATIENCE_S)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
+        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
         yield browser
         browser.close()
 

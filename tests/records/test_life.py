@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from station.channel.line import Outcome, Reason
 from station.messages import records as messages
 from station.records.errors import BadRecordError, LockedError, RecordsClosedError, UnknownInspectionError
+from station.records.lots import read_lots, start_lot
 from station.records.model import AlarmEntry, AlarmRow
 from tests.records.causes import because
 
@@ -48,6 +49,22 @@ def test_numbers_go_on_over_restarts(opened, scenario, trigger):
             async with opened() as records:
                 given_numbers += [await records.begin(trigger) for _ in range(2)]
         assert given_numbers == [1, 2, 3, 4, 5, 6]
+
+    scenario(steps)
+
+
+def test_a_request_that_fails_half_way_leaves_nothing_and_the_others_of_its_transaction_are_stored(opened, scenario):
+    async def steps():
+        def half(connection):
+            start_lot(connection, "half", "Hill Farm")
+            raise BadRecordError(messages.AUDIT_VALUE(value="x", words="no JSON"), messages.SEE_LOG())
+
+        async with opened() as records:
+            changes = (half, lambda connection: start_lot(connection, "whole", "Hill Farm"), half)
+            ended = await asyncio.gather(*map(records.change, changes), return_exceptions=True)
+            assert [type(each) is BadRecordError for each in ended] == [True, False, True]
+            lots = await records.change(lambda connection: read_lots(connection, 10))
+            assert [lot.name for lot in lots] == ["whole"]
 
     scenario(steps)
 

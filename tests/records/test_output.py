@@ -15,6 +15,7 @@ from station.records import export as exporting
 from station.records.errors import DiskFullError
 from station.records.export import COLUMNS, export
 from station.records.search import Query
+from tests.chromium import ARGUMENTS
 from tests.records.causes import because
 
 
@@ -119,13 +120,7 @@ def test_a_lots_report_is_printed_on_a4_with_lot_and_station_on_each_page(histor
     assert f'@top-left {{ content: "Lot {name}"' in sheet
     assert r'@top-right { content: "station\00002d1"' in sheet
     pdf = tmp_path / "lot.pdf"
-    options = (
-        "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--no-pdf-header-footer",
-        f"--user-data-dir={tmp_path / 'p'}",
-    )
+    options = (*ARGUMENTS, "--no-pdf-header-footer", f"--user-data-dir={tmp_path / 'p'}")
     command = [chromium, *options, f"--print-to-pdf={pdf}", (tmp_path / "lot.html").as_uri()]
     subprocess.run(command, capture_output=True, check=True, timeout=200)
     printed = pdf.read_bytes()
@@ -137,6 +132,6 @@ def test_a_lots_report_is_printed_on_a4_with_lot_and_station_on_each_page(histor
 def test_a_browser_shows_the_report(history, ask, tmp_path, chromium):
     ask("report", "other", tmp_path / "lot.html")
     profile, picture = tmp_path / "profile", tmp_path / "lot.png"
-    options = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}", f"--screenshot={picture}")
+    options = (*ARGUMENTS, f"--user-data-dir={profile}", f"--screenshot={picture}")
     subprocess.run([chromium, *options, (tmp_path / "lot.html").as_uri()], capture_output=True, check=True, timeout=100)
     assert picture.stat().st_size > 10_000

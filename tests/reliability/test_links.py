@@ -4,7 +4,7 @@ import asyncio
 import random
 import socket
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing
 
 import pytest
 
@@ -19,9 +19,9 @@ async def echoed() -> AsyncIterator[tuple[Link, asyncio.StreamReader, asyncio.St
     """A link to a server that gives everything back, and a connection through it."""
 
     async def echo(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        while data := await reader.read(1000):
-            writer.write(data)
-        writer.close()
+        with closing(writer):
+            while data := await reader.read(1000):
+                writer.write(data)
 
     server = await asyncio.start_server(echo, BEHIND, 0)
     port = server.sockets[0].getsockname()[1]

@@ -10,7 +10,7 @@ from station.twin.fruit import draw_fruit
 from station.twin.gel import Gel
 from station.twin.squeeze import Squeeze
 from station.vision.contact import FloatImage
-from station.vision.methods import median_image
+from station.vision.median import median_image
 from station.vision.reference_check import ReferenceCheck
 from station.vision.working import clipped, resized, working_image
 from tests.conftest import SHARED

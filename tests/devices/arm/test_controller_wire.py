@@ -8,6 +8,7 @@ import socket
 import struct
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import psutil
 import pytest
@@ -461,6 +462,19 @@ def test_the_device_check_says_what_was_found_and_what_to_do(bench, fault, verdi
             said += [each for one in said for each in one.parameters.values() if isinstance(each, Message)]
             assert message.id in {each.id for each in said}
             assert all((finding.remedy is None) == (finding.verdict == "ok") for finding in findings)
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ("answered_s", "verdict"), [((0.0, 0.5, 0.51, 0.9, 1.3), "ok"), ((0.0, 0.4, 0.8, 1.2, 1.6), "fault")]
+)
+def test_a_pause_at_one_request_is_no_late_stream(bench, monkeypatch, answered_s, verdict):
+    async def run():
+        async with bench() as made:
+            monkeypatch.setattr("station.devices.arm.probe.time", SimpleNamespace(monotonic=iter(answered_s).__next__))
+            findings = await probe_arm(made.settings())
+            assert [finding.verdict for finding in findings] == ["ok", verdict, "ok"]
 
     asyncio.run(run())
 

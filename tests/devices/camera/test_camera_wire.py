@@ -266,9 +266,9 @@ def test_nobody_there_is_said_with_a_remedy(twin_settings):
 )
 def test_a_peer_gone_mad_is_described(twin_settings, header, said):
     async def answer(reader, writer):
-        writer.write(struct.pack(">I", len(header)) + header)
-        await writer.drain()
-        writer.close()
+        with contextlib.closing(writer):
+            writer.write(struct.pack(">I", len(header)) + header)
+            await writer.drain()
 
     async def play():
         server = await asyncio.start_server(answer, "127.0.0.1", 0)
@@ -288,9 +288,9 @@ def test_a_frame_that_is_older_than_the_one_before_it_is_never_given(twin_settin
         return struct.pack(">I", len(text)) + text + bytes(12)
 
     async def answer(reader, writer):
-        writer.write(message(5) + message(4))
-        await reader.read()
-        writer.close()
+        with contextlib.closing(writer):  # also where the loop ends before the camera's end has come
+            writer.write(message(5) + message(4))
+            await reader.read()
 
     async def play():
         server = await asyncio.start_server(answer, "127.0.0.1", 0)
@@ -338,10 +338,9 @@ def test_a_peer_that_hangs_up_or_says_nothing_is_told_in_words(twin_settings, mo
     monkeypatch.setattr("station.devices.camera.twin._SILENCE_S", 0.2)
 
     async def answer(reader, writer):
-        with contextlib.suppress(TimeoutError):
+        with contextlib.closing(writer), contextlib.suppress(TimeoutError):
             async with asyncio.timeout(hold_s):
                 await reader.read()
-        writer.close()
 
     async def play():
         server = await asyncio.start_server(answer, "127.0.0.1", 0)
@@ -355,10 +354,13 @@ def test_a_peer_that_hangs_up_or_says_nothing_is_told_in_words(twin_settings, mo
     asyncio.run(play())
 
 
-def test_the_probe_counts_the_time_between_frames(monkeypatch, twin_settings):
+@pytest.mark.parametrize(
+    ("rate", "verdict", "remedy"), [(30.0, "ok", None), (20.0, "warning", messages.REMEDY_SLOW(rate=30.0))]
+)
+def test_the_probe_counts_the_time_between_frames(monkeypatch, twin_settings, rate, verdict, remedy):
     class Steady:
         description = CameraDescription("steady", 480, 640, 0.03, 30.0)
-        frames = iter([Frame(np.zeros((1, 1, 3), np.uint8), number, number / 30) for number in range(1, 99)])
+        frames = iter([Frame(np.zeros((1, 1, 3), np.uint8), number, number / rate) for number in range(1, 99)])
 
         async def open(self): ...
 
@@ -369,7 +371,8 @@ def test_the_probe_counts_the_time_between_frames(monkeypatch, twin_settings):
 
     monkeypatch.setattr("station.devices.camera.probe.camera_from", lambda _: Steady())
     [finding] = asyncio.run(probe_camera(twin_settings(1)))
-    assert finding.found.parameters["rate"] == pytest.approx(30.0)
+    assert finding.found.parameters["rate"] == pytest.approx(rate)
+    assert (finding.device, finding.verdict, finding.remedy) == ("camera", verdict, remedy)
 
 
 def test_the_probe_tells_a_good_camera_a_sick_one_and_none(bench, twin_settings):
@@ -377,10 +380,8 @@ def test_the_probe_tells_a_good_camera_a_sick_one_and_none(bench, twin_settings)
         async with bench() as one:
             settings = twin_settings(one.server.port)
             [good] = await probe_camera(settings)
-            for _ in range(4):  # a busy machine delivers fewer frames than were promised, and the probe says so
-                if good.verdict != "ok":
-                    [good] = await probe_camera(settings)
-            assert (good.device, good.verdict, good.remedy) == ("camera", "ok", None)
+            # A busy machine delivers fewer frames than were promised, and the probe says so.
+            assert good.verdict == "ok" or good.remedy == messages.REMEDY_SLOW(rate=30.0)
             assert (good.found.parameters["width_px"], good.found.parameters["height_px"]) == (480, 640)
             one.server.faults.set("frame_black")
             [sick] = await probe_camera(settings)

@@ -304,10 +304,10 @@ def test_no_answer_whatsoever_does_more_than_raise_a_gripper_error(reply: bytes,
         asyncio.get_running_loop().set_exception_handler(lambda _, context: unseen.append(context))
 
         async def mad(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            with contextlib.suppress(ConnectionError):  # the driver may hang up while the madman still talks
+            # The driver may hang up while the madman still talks, or the loop end before its end has come.
+            with contextlib.closing(writer), contextlib.suppress(ConnectionError):
                 while await reader.read(100):
                     writer.write(reply)
-            writer.close()
 
         server = await asyncio.start_server(mad, "127.0.0.1", 0)
         port = server.sockets[0].getsockname()[1]
@@ -337,9 +337,9 @@ def test_an_answer_to_another_question_is_refused():
 
     async def scenario() -> None:
         async def deaf(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            while await reader.read(100):
-                writer.write(status)
-            writer.close()
+            with contextlib.closing(writer):
+                while await reader.read(100):
+                    writer.write(status)
 
         server = await asyncio.start_server(deaf, "127.0.0.1", 0)
         port = server.sockets[0].getsockname()[1]
@@ -360,10 +360,10 @@ def test_an_answer_to_another_question_is_refused():
 def test_a_value_that_a_variable_cannot_have_is_refused(lie: str):
     async def scenario() -> None:
         async def mad(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            while line := await reader.readline():
-                name = line.decode().split()[1]
-                writer.write(f"{lie if lie.startswith(name) else f'{name} 0'}\n".encode())
-            writer.close()
+            with contextlib.closing(writer):
+                while line := await reader.readline():
+                    name = line.decode().split()[1]
+                    writer.write(f"{lie if lie.startswith(name) else f'{name} 0'}\n".encode())
 
         server = await asyncio.start_server(mad, "127.0.0.1", 0)
         # An answer comes to every question: no limit is to pass, also where this is held up between the two.

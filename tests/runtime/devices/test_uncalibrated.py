@@ -1,6 +1,7 @@
 """A unit without a calibration takes no fruit, and says what to do; it goes on by itself once it has one."""
 
 import asyncio
+import time
 
 import pytest
 
@@ -17,10 +18,15 @@ NUMBER = ALARMS[AlarmId.CALIBRATION_OLD].number
 TRIGGER_AND_ENABLE = 3
 
 
-async def until(holds):
-    async with asyncio.timeout(90):
-        while not await holds():
-            await asyncio.sleep(0.02)
+async def until(holds, plc, cell):
+    """Wait until something holds; a failure says what PLC and station were at meanwhile."""
+    deadline_s = time.monotonic() + 90
+    while not await holds():
+        assert time.monotonic() < deadline_s, (
+            f"{holds.__name__}: {await plc.status()}, alarm {await plc.read('error_code')}, {cell.phase}, "
+            f"{(await cell.line.state()).why_not_ready}"
+        )
+        await asyncio.sleep(0.02)
 
 
 @pytest.mark.timeout(300)
@@ -37,8 +43,8 @@ def test_triggers_are_refused_with_the_remedy_until_the_sensor_is_calibrated(ben
             async def alarmed():
                 return await plc.read("error_code") == NUMBER
 
-            await until(refused)
-            await until(alarmed)
+            await until(refused, plc, cell)
+            await until(alarmed, plc, cell)
             shown = await plc.scan()
             assert BY_NAME["last_refusal"].codes[shown["last_refusal"]].name == "not_ready"
             assert shown["accepted_trigger_id"] != 7
@@ -55,7 +61,7 @@ def test_triggers_are_refused_with_the_remedy_until_the_sensor_is_calibrated(ben
             async def ready():
                 return "trigger_ready" in await plc.status() and await plc.read("error_code") == 0
 
-            await until(ready)
+            await until(ready, plc, cell)
             result = await plc.inspect(8, deadline_s=90)
             record = await cell.station.service.registry.records.inspection(result.sequence)
             assert made.id in record.judged.devices["calibration"]

@@ -10,7 +10,7 @@ from station.runtime.state_files import StateFiles
 from station.settings.recipe import find_recipe
 from station.settings.service import ReferenceSettings
 from station.twin.digit.sensor import Condition, DigitSensor
-from station.vision.methods import median_image
+from station.vision.median import median_image
 
 
 @pytest.mark.parametrize(

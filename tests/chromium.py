@@ -1,0 +1,20 @@
+"""Arguments of a Chromium under test."""
+
+_WITHOUT = (
+    # They keep a process ready for the address bar's suggestions: half a second of a core for each window.
+    "WebUIOmniboxPopup", "WebUIOmniboxAimPopup", "WebUIOmniboxFullPopup",
+    # Playwright switches these off too, by an argument that this one takes the place of.
+    "AimEnabled", "HttpsUpgrades", "PaintHolding", "OptimizationHints", "MediaRouter",
+)  # fmt: skip
+ARGUMENTS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    f"--disable-features={','.join(_WITHOUT)}",
+)
+"""Headless, in a container, without what a person's browser does in its background."""

@@ -1,0 +1,41 @@
+"""Which tests are timing-bound, and what the kept rounds say."""
+
+from benchmarks.reliability.flaky import Round, failures, played, timing_bound
+
+FILE = """
+def waits(until):
+    until(lambda: True)
+
+def test_a_sum():
+    assert 1 + 1 == 2
+
+def test_an_end(eventually):
+    eventually(lambda: True)
+
+def test_a_limit():
+    run(deadline_s=2.0)
+"""
+
+
+def played_with(seed: int, *failed: str) -> Round:
+    return Round(date="2026-11-26", commit="c", seed=seed, tests=300, failed=list(failed), minutes=2.5, load=6.0 + seed)
+
+
+def test_what_reads_a_clock_or_waits_is_timing_bound_and_a_sum_is_not(tmp_path):
+    folder = tmp_path / "tests"
+    (folder / "room").mkdir(parents=True)
+    (folder / "room" / "test_some.py").write_text(FILE)
+    assert timing_bound(folder) == [
+        "tests/room/test_some.py::test_an_end",
+        "tests/room/test_some.py::test_a_limit",
+    ]
+
+
+def test_a_failure_is_open_until_a_round_has_passed_since():
+    rounds = [played_with(1, "a::one", "b::two"), played_with(2, "a::one"), played_with(3)]
+    assert failures(rounds)[2:] == ["| `a::one` | 2 | 1, 2 | 1 |", "| `b::two` | 1 | 1 | 2 |"]
+    said = " ".join(played(rounds, 100, "2 cores"))
+    assert "**3** of the 100 rounds" in said
+    assert "passed in 1." in said
+    assert "900 runs of a test in all, of which   3 failed" in said
+    assert "load 7.0 to 9.0" in said

@@ -1,0 +1,56 @@
+"""A person's *Stop* and *Start*, in any order: the last one counts."""
+
+import asyncio
+
+import pytest
+
+from station.channel.client import ChannelClient
+from station.channel.panel import Actor
+from station.channel.panel_live import (
+    GetPanelState,
+    OperatorCommand,
+    OperatorCommandName,
+    OperatorCommandView,
+    PanelState,
+)
+from station.devices.gripper.errors import GripperUnreachableError
+from station.inspection.states import State
+from station.messages import commands
+from station.settings.hmi import panel_endpoint
+
+
+@pytest.mark.timeout(240)
+def test_a_start_after_a_stop_is_no_second_press_of_the_start_before_it(bench):
+    """The first *Start* waits for the gripper; the *Stop* ends it, and the *Start* after that is one of its own."""
+
+    async def scenario():
+        async with bench() as cell:
+            service, configuration = cell.station.service, cell.configuration
+            cell.twin.boards["gripper"].set("off")
+            await cell.until(lambda: isinstance(service._devices.faults.get("gripper"), GripperUnreachableError))
+            assert cell.phase is State.UNKNOWN
+            async with ChannelClient(panel_endpoint(configuration.hmi, configuration.home), "the station") as panel:
+
+                async def give(order):
+                    person = Actor(who="Ada", role="operator")
+                    request = OperatorCommand(person=person, order=OperatorCommandName(order))
+                    return await panel.request(request, OperatorCommandView, deadline_s=20)
+
+                async def outcome(given):
+                    state = await panel.request(GetPanelState(), PanelState, deadline_s=20)
+                    return next(each for each in state.orders if each.ticket == given.ticket)
+
+                first = await give("start")
+                assert first.state == "executing"
+                assert (await give("start")).ticket == first.ticket
+                await give("stop")
+                assert service.stopped_by_person
+                again = await give("start")
+                assert again.ticket != first.ticket
+                assert not service.stopped_by_person
+                assert (await outcome(first)).why == commands.STOPPED_MEANWHILE()
+                assert again.state == "executing"
+                cell.twin.boards["gripper"].clear()
+                await cell.reach(State.IDLE)
+
+    asyncio.run(scenario())
