@@ -1,13 +1,11 @@
 """One fruit's cycle: its times, fruit a minute, and what of it is motion, settling, camera and ours.
 
-Run with `./run bench cycle [--before REVISION]`. Starts a twin with an arm and the station's process, has fruit
-inspected over the channel, one by one and then as fast as triggers are accepted, and makes the same moves and waits
-without the station: the same drivers, the measured widths, as many frames, nothing else. With a revision of the
-repository the same fruit are inspected by the station of then in the same run. Writes `docs/cycle-time.md` and
-`docs/images/cycle-time.svg`, and the pace into `README.md`, `docs/sizing.md` and `docs/plc/index.md`.
+Run with `./run bench cycle`. Starts a twin with an arm and the station's process, has fruit inspected over the channel,
+one by one and then as fast as triggers are accepted, and makes the same moves and waits without the station: the same
+drivers, the measured widths, as many frames, nothing else. Writes `docs/cycle-time.md`, `docs/images/cycle-time.svg`,
+and the pace into `README.md`, `docs/sizing.md` and `docs/plc/index.md`.
 """
 
-import argparse
 import asyncio
 import contextlib
 import os
@@ -26,7 +24,6 @@ from typing import NamedTuple
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
-from revision import checked_out
 from sections import write
 
 from station.channel.client import ChannelClient
@@ -105,8 +102,8 @@ anywhere: [a mixed line](triggers.md). Unverified on hardware.
 
 {table}
 
-*Measured*: by the shipped recipe's `steps.measured`. *Otherwise*: the other way, in the same run, as
-is *before*, the station of an earlier revision, where one was given (`--before`). The force on the fruit by both ways:
+*Measured*: by the shipped recipe's `steps.measured`. *Otherwise*: the other way, in the same run. The force on the
+fruit by both ways:
 [decision 63](decisions/0063-measurement-while-the-jaws-close.md#force-on-the-fruit).
 
 ![The floor's parts and ours](images/cycle-time.svg)
@@ -162,13 +159,13 @@ class Pace(NamedTuple):
     """Fruit a minute where each is triggered as soon as the station accepts it."""
 
 
-def start(name: str, file: Path, *arguments: str, tree: Path = ROOT) -> subprocess.Popen[str]:
+def start(name: str, file: Path, *arguments: str) -> subprocess.Popen[str]:
     """One of the station's programs; returns once it runs, and ends with its messages where it does not."""
     command = [sys.executable, "-m", "station", name, *arguments, "--config", str(file)]
     messages = file.with_name(f"{name}.log")
     with messages.open("w") as output:
-        environment = {**os.environ, "PYTHONPATH": str(tree)}
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=output, text=True, cwd=tree, env=environment)
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=output, text=True, cwd=ROOT, env=environment)
     if not any(line.startswith("running") for line in process.stdout or ()):
         process.communicate()
         raise SystemExit(f"station {name} ended with exit code {process.returncode}:\n{messages.read_text()}")
@@ -349,11 +346,10 @@ def table(
     shipped: Mapping[str, Recipe],
     results: Mapping[str, Pace],
     other: Mapping[str, Pace],
-    before: Mapping[str, Pace],
     spent: Spent,
 ) -> list[str]:
     """Medians over the fruit."""
-    rows, beside = [], {"otherwise": other, **({"before": before} if before else {})}
+    rows = []
     for kind in FRUIT:
         pace = results[kind]
         outcomes = ", ".join(f"{times} {name}" for name, times in Counter(each.outcome for each in pace.alone).items())
@@ -363,16 +359,11 @@ def table(
         ours_s = statistics.median(each.to_next_s - sum(floor.kinds_s.values()) for each, _, floor in spent[kind])
         cells = [kind, WAYS[shipped[kind].steps.measured], outcomes, f"{twice}"]
         cells += [f"{outcome_s:.2f}", f"{next_s:.2f}", f"{pace.a_minute:.1f}"]
-        for each in beside.values():
-            cells += [*(f"{seconds:.2f}" for seconds in medians(each[kind])), f"{each[kind].a_minute:.1f}"]
+        cells += [*(f"{seconds:.2f}" for seconds in medians(other[kind])), f"{other[kind].a_minute:.1f}"]
         rows.append(f"| {' | '.join(cells)} | {floor_s:.2f} | {ours_s:.2f} | {100 * ours_s / floor_s:.1f} % |")
     names = ("fruit", "measured", "outcome", "closed on twice", "to outcome, s", "to next trigger, s", "fruit a minute")
-    others = [name for each in beside for name in (f"{each}: to outcome", "to next trigger", "fruit a minute")]
-    header = [
-        f"| {' | '.join((*names, *others, 'floor, s', 'ours, s', '% of the floor'))} |",
-        "|---" * (10 + len(others)) + "|",
-    ]
-    return [*header, *rows]
+    others = ("otherwise: to outcome", "to next trigger", "fruit a minute", "floor, s", "ours, s", "% of the floor")
+    return [f"| {' | '.join((*names, *others))} |", "|---" * len((*names, *others)) + "|", *rows]
 
 
 def pace_table(shipped: Mapping[str, Recipe], results: Mapping[str, Pace], other: Mapping[str, Pace]) -> list[str]:
@@ -491,23 +482,8 @@ def inspected_otherwise(shipped: Mapping[str, Recipe]) -> dict[str, Pace]:
             return asyncio.run(inspect(configuration))
 
 
-def inspected_before(revision: str) -> dict[str, Pace]:
-    """The same fruit by the station of a revision."""
-    with tempfile.TemporaryDirectory() as home, checked_out(revision) as tree:
-        file, configuration = configured(home)
-        with (
-            ended(start("twin", file, "--console", str(CONSOLE), tree=tree)),
-            ended(start("service", file, tree=tree)),
-        ):
-            return asyncio.run(inspect(configuration))
-
-
 def main() -> None:
     """Measure, print, and write the document and its chart."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--before", metavar="REVISION", help="compare with the station of this revision")
-    revision = parser.parse_args().before
-    before = inspected_before(revision) if revision else {}
     shipped = load_recipes()
     other = inspected_otherwise(shipped)
     with tempfile.TemporaryDirectory() as folder:
@@ -522,7 +498,7 @@ def main() -> None:
         in_a_row=IN_A_ROW,
         load=os.getloadavg()[0],
         cores=os.cpu_count(),
-        table="\n".join(table(shipped, results, other, before, spent)),
+        table="\n".join(table(shipped, results, other, spent)),
         overshoots="\n".join(overshoot_table(spent)),
         most_mm=MOST_UNSEEN_MM,
         phases="\n".join(phase_table(spent)),

@@ -2,8 +2,8 @@
 
 Run with `./run bench hmi [SECONDS] [--rounds N]`: a whole demonstration with fruit after fruit; nobody looks, three
 panels take the page Run, ten readers page through the history and its images, three headless Chromiums show the page
-Run on the same cores, in turn in every round. Writes `docs/hmi-speed.md`. With `--pictures` it only draws the pages
-into `docs/images/hmi-*.png`.
+Run on the same cores, and then the same page made with NiceGUI, in turn in every round. Writes `docs/hmi-speed.md`.
+With `--pictures` it only draws the pages into `docs/images/hmi-*.png`.
 """
 
 import argparse
@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 import psutil
 from bench_plc import built, free_port
+from looking.peer import nicegui, peer_browsers
 from looking.pictures import draw
 from looking.rounds import (
     BROWSERS,
@@ -28,6 +29,7 @@ from looking.rounds import (
     LOOKERS,
     NOBODY,
     PANELS,
+    PEER,
     READERS,
     Round,
     asking,
@@ -52,6 +54,9 @@ ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 
 
+OWN_PICTURE, PEER_PICTURE = "img.fruit-picture", ".fruit-picture img"
+
+
 class Load(NamedTuple):
     """A first load of the page Run, with nothing kept from before."""
 
@@ -59,11 +64,18 @@ class Load(NamedTuple):
     requests: int
     shown_s: float
 
+    @property
+    def row(self) -> str:
+        """Its line of the table, without its name."""
+        return f"{self.transferred_bytes / 1000:.0f} | {self.requests} | {self.shown_s:.1f}"
+
 
 class Demo(NamedTuple):
     """The running demonstration."""
 
     site: Configuration
+    configuration: Path
+    """The file that `site` is from."""
     process: subprocess.Popen[bytes]
     log: Path
     console: int
@@ -109,7 +121,7 @@ def demo(first: int = FRUIT_FIRST, **settings: dict[str, Any]) -> Iterator[Demo]
         command = [sys.executable, "-m", "station", "demo", "--console", str(console), "--speed", "12"]
         with log.open("wb") as output:
             process = subprocess.Popen(command, stdout=output, stderr=output, env=environment)
-        running = Demo(load_configuration(file, {"STATION_HOME": folder}), process, log, console)
+        running = Demo(load_configuration(file, {"STATION_HOME": folder}), file, process, log, console)
         try:
             until(lambda: running.fruit() >= first or process.poll() is not None)
             if process.poll() is not None:
@@ -129,8 +141,14 @@ def until(what: Callable[[], Any]) -> None:
         time.sleep(0.05)
 
 
-def first_load(browser: Browser, address: str) -> Load:
-    """The page Run in a browser that has never seen it."""
+def first_load(browser: Browser, address: str, shown: str) -> Load:
+    """The page Run in a browser that has never seen it.
+
+    Args:
+        browser: to load it.
+        address: of the page.
+        shown: selects the fruit's picture.
+    """
     context = browser.new_context(viewport={"width": 1280, "height": 800})
     page = context.new_page()
     sizes: list[float] = []
@@ -140,7 +158,7 @@ def first_load(browser: Browser, address: str) -> Load:
     watching.on("Network.loadingFinished", lambda told: sizes.append(told["encodedDataLength"]))
     began_s = time.monotonic()
     page.goto(address)
-    picture = page.locator("img.fruit-picture")
+    picture = page.locator(shown).first
     until(lambda: picture.count() and picture.evaluate("picture => picture.naturalWidth"))
     shown_s = time.monotonic() - began_s
     page.wait_for_timeout(500)
@@ -148,39 +166,46 @@ def first_load(browser: Browser, address: str) -> Load:
     return Load(round(sum(sizes)), len(sizes), shown_s)
 
 
-def written(load: Load, found: dict[str, list[Round]], conditions: str) -> str:
+def written(load: Load, peer: Load, found: dict[str, list[Round]], conditions: str) -> str:
     """The document."""
     told = (
         "Written by `./run bench hmi`: a demonstration with fruit after fruit, the page Run updated "
         f"{1 / REFRESH_S:.0f} times a second. Three panels: clients in a process of their own that read the page's "
         "stream and fetch its pictures, as separate panel computers do. Ten readers: likewise, each opens a page of "
         "the history or a fruit with all its images every second. Three browsers: headless "
-        "Chromium that renders the pages on the station's own cores, the worst case."
+        "Chromium that renders the pages on the station's own cores, the worst case. NiceGUI's page: the peer, with "
+        "the same figures, charts and picture, updated as often from the same channel, by a process of its own; the "
+        "station's pages are served beside it, to nobody."
     )
-    first = (
-        f"First load of the page Run: {load.transferred_bytes / 1000:.0f} kB in {load.requests} requests, its picture "
-        f"displayed after {load.shown_s:.1f} s."
-    )
+    first = [
+        "| first load of the page Run | kB | requests | picture displayed after, s |",
+        "|---|---|---|---|",
+        f"| this page | {load.row} |",
+        f"| NiceGUI's page | {peer.row} |",
+    ]
     lines = ["# Cost of the operators' pages", "", told, "", *table(found), "", *differences(found)]
-    return "\n".join([*lines, "", first, "", conditions, ""])
+    return "\n".join([*lines, "", *first, "", conditions, ""])
 
 
 def measure(running: Demo, browser: Browser, rounds: int, seconds: float) -> str:
     """All of it; gives the document."""
     host, port = running.site.hmi.host, running.site.hmi.port
-    load = first_load(browser, address_of(running.site.hmi))
+    load = first_load(browser, address_of(running.site.hmi), OWN_PICTURE)
+    with nicegui(running.configuration) as (_, address):
+        peer = first_load(browser, address, PEER_PICTURE)
     parts = {name: running.part(name) for name in ("hmi", "service")}
     who = {
         NOBODY: contextlib.nullcontext,
         PANELS: lambda: clients("panels", LOOKERS, host, port),
         READERS: lambda: clients("readers", HISTORY_READERS, host, port),
         BROWSERS: lambda: browsers(browser, host, port),
+        PEER: lambda: peer_browsers(browser, running.configuration, LOOKERS),
     }
     metrics = f"http://{running.site.metrics.host}:{running.site.metrics.port}/metrics"
     with tempfile.TemporaryDirectory() as folder:
         plc = asking(built("load", Path(folder)), running.site.modbus.port)
         found = compared(who, parts, plc, metrics, rounds, seconds)
-    return written(load, found, conditions_of(rounds, seconds))
+    return written(load, peer, found, conditions_of(rounds, seconds))
 
 
 def main() -> int:

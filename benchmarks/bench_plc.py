@@ -23,6 +23,7 @@ from typing import NamedTuple
 import psutil
 
 from plc_interface.process.real_time import request_real_time_priority
+from plc_interface.server import connection
 from plc_interface.server.image import RegisterImage
 from plc_interface.server.server import ModbusServer
 from station.settings.modbus import ModbusSettings
@@ -35,6 +36,7 @@ CLIENTS = (1, 8, 32)
 SCAN_US = 10_000
 ROUNDS = 3
 DURATION_S = 4.0
+_UNLIMITED_PER_S = 10**9
 OURS, PLAIN, STOCK, LIBMODBUS = "this server", "this server, ordinary priority", "stock pymodbus", "libmodbus (C)"
 
 
@@ -48,8 +50,9 @@ class Figures(NamedTuple):
 
 
 def serve_ours(port: int, *, priority: bool) -> None:
-    """Our server, as its process runs it."""
+    """Our server, as its process runs it, but for a connection's limit, which would hide what a closed loop shows."""
     logging.disable(logging.CRITICAL)
+    connection.REQUESTS_PER_S = _UNLIMITED_PER_S
 
     async def serve() -> None:
         most = 2 * max(CLIENTS)

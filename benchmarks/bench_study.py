@@ -32,7 +32,7 @@ from station.studies.sample import Task
 from station.studies.study import Request, Study, judged, run_study, summary
 from station.twin.fruit import Kind
 from station.vision.contact import Image
-from station.vision.methods import median_image
+from station.vision.median import median_image
 from station.vision.paper import amplified_difference, denoise
 from station.vision.quality import denoising_quality
 

@@ -15,7 +15,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from benchmarks import summary
+from benchmarks import against, summary
+from benchmarks.revision import commit
 from benchmarks.summary import BENCHMARKS
 
 FOLDER = Path(__file__).resolve().parent
@@ -23,6 +24,8 @@ USAGE = """usage: ./run bench                  all but the long ones, in turn; t
        ./run bench --all            all of them
        ./run bench NAME [NAME ...]  these
        ./run bench NAME OPTIONS     one, its own way (--help lists its options)
+       ./run bench --against REVISION NAME [NAME ...]
+                                    these in turn with those of an earlier revision
        ./run bench --list           what there is
 """
 
@@ -41,15 +44,6 @@ def listing(runs: dict[str, dict[str, Any]]) -> str:
         took = f"{runs[name]['minutes']} min" if name in runs else "-"
         lines.append(f"{name:12} {'long' if BENCHMARKS[name].get('long') else '':5} {took:>9}  {about}")
     return "\n".join(lines)
-
-
-def commit() -> str:
-    """Return the commit that is measured, with a `+` where its code was changed; empty outside a repository."""
-    git = ["git", "-C", str(FOLDER.parent)]
-    head = subprocess.run([*git, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False)
-    code = ("*.py", "*.yaml", "*.lock")  # not the pages, which benchmarks write
-    changed = subprocess.run([*git, "diff", "--quiet", "HEAD", "--", *code], capture_output=True, check=False)
-    return head.stdout.strip() + "+" * (changed.returncode == 1)
 
 
 def run(names: Sequence[str], options: Sequence[str] = ()) -> int:
@@ -99,6 +93,8 @@ def main(arguments: Sequence[str]) -> int:
         return run([name for name in sorted(BENCHMARKS) if arguments or not BENCHMARKS[name].get("long")])
     if set(arguments) <= set(BENCHMARKS):
         return run(arguments)
+    if arguments[0] == "--against" and arguments[2:] and set(arguments[2:]) <= set(BENCHMARKS):
+        return against.run(arguments[1], arguments[2:], lambda name: run([name]))
     if arguments[0] in BENCHMARKS:
         return run(arguments[:1], arguments[1:])
     print(USAGE, file=sys.stdout if arguments[0] in {"-h", "--help", "help"} else sys.stderr)

@@ -12,7 +12,7 @@ from fit.progress import report
 from fit.reliability import PERTURBATIONS, perturbed
 from station.twin.digit.sensor import Condition, DigitSensor
 from station.vision.contact import FloatImage, Image
-from station.vision.methods import median_image
+from station.vision.median import median_image
 from station.vision.reference_check import ReferenceCheck
 from station.vision.working import clipped, resized, working_image
 

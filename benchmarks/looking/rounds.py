@@ -1,6 +1,6 @@
 """The PLC's latency, the cycle's own time and the processor with nobody looking, with panels, readers and browsers.
 
-In turn in every round.
+In turn in every round; the last browsers show the same page made with NiceGUI, the peer.
 """
 
 import contextlib
@@ -19,11 +19,12 @@ from bench_plc import Figures, measured
 from playwright.sync_api import Browser
 from prometheus_client.parser import text_string_to_metric_families
 
-NOBODY, PANELS, READERS, BROWSERS = (
+NOBODY, PANELS, READERS, BROWSERS, PEER = (
     "no client",
     "three panels",
     "ten readers of the history",
     "three browsers on these cores",
+    "three browsers, NiceGUI's page",
 )
 LOOKERS, HISTORY_READERS = 3, 10
 OWN_PHASES = ("awaiting_measure", "measuring_last", "judging", "recording_accept", "recording_reject")
@@ -40,7 +41,7 @@ class Round(NamedTuple):
 
     latency: Figures
     shares: dict[str, float]
-    """By process, % of a core."""
+    """By process, % of a core; `hmi` is the one that serves the pages, with the peer its own."""
     own_ms: float
     """Of the cycle: measuring, judging and recording, for which nothing moves, for each fruit."""
 
@@ -84,7 +85,7 @@ def clients(who: str, count: int, host: str, port: int) -> Iterator[None]:
 
 @contextlib.contextmanager
 def browsers(browser: Browser, host: str, port: int) -> Iterator[None]:
-    """Three browsers with the page Run, on the cores that the station has."""
+    """Browsers with the page Run, on the cores that the station has."""
     contexts = [browser.new_context() for _ in range(LOOKERS)]
     try:
         for context in contexts:
@@ -98,25 +99,35 @@ def browsers(browser: Browser, host: str, port: int) -> Iterator[None]:
 
 
 def compared(
-    conditions: dict[str, Callable[[], contextlib.AbstractContextManager[None]]],
+    conditions: dict[str, Callable[[], contextlib.AbstractContextManager[psutil.Process | None]]],
     parts: dict[str, psutil.Process],
     load: Callable[[float], Figures],
     metrics: str,
     rounds: int,
     seconds: float,
 ) -> dict[str, list[Round]]:
-    """Each condition in each round, another one first each time; the processor while the latency is measured."""
+    """Each condition in each round, another one first each time; the processor while the latency is measured.
+
+    Args:
+        conditions: by name; one whose pages come from another process than the station's own gives that process.
+        parts: the station's processes, by name.
+        load: the PLC's reads for some seconds.
+        metrics: address of the station's metrics.
+        rounds: of all conditions.
+        seconds: of each condition in each round.
+    """
     found: dict[str, list[Round]] = {name: [] for name in conditions}
     names = list(conditions)
     for number in range(rounds):
         first = number % len(names)
         for name in names[first:] + names[:first]:
-            with conditions[name]():
+            with conditions[name]() as serving:
+                processes = {**parts, "hmi": serving or parts["hmi"]}
                 load(0.5)
                 own_s, fruit = own_time(metrics)
-                before = {part: sum(process.cpu_times()[:2]) for part, process in parts.items()}
+                before = {part: sum(process.cpu_times()[:2]) for part, process in processes.items()}
                 latency = load(seconds)
-                after = {part: sum(process.cpu_times()[:2]) for part, process in parts.items()}
+                after = {part: sum(process.cpu_times()[:2]) for part, process in processes.items()}
                 later_s, later_fruit = own_time(metrics)
             shares = {part: 100 * (after[part] - before[part]) / seconds for part in parts}
             if later_fruit == fruit:
@@ -178,7 +189,7 @@ ROWS = (
     Row("PLC's latency at a 10 ms scan, p99", "µs", 0, lambda each: each.latency.p99_us),
     Row("PLC's latency at a 10 ms scan, worst", "µs", 0, lambda each: each.latency.worst_us),
 )
-BOTH, OWN, P50, P99 = ROWS[2:6]
+PAGES, _, BOTH, OWN, P50, P99, _ = ROWS
 
 
 def table(found: dict[str, list[Round]]) -> list[str]:
@@ -197,10 +208,11 @@ def table(found: dict[str, list[Round]]) -> list[str]:
 
 
 def differences(found: dict[str, list[Round]]) -> list[str]:
-    """Each condition against nobody looking, round by round, and what follows."""
-    lines = ["| against no client | " + " | ".join(list(found)[1:]) + " |", "|---|" + "---|" * (len(found) - 1)]
+    """Each condition against nobody looking, round by round, the peer against our page, and what follows."""
+    ours = [name for name in found if name not in {NOBODY, PEER}]
+    lines = ["| against no client | " + " | ".join(ours) + " |", "|---|" + "---|" * len(ours)]
     sentences = []
-    told = {row: {name: _against(found, name, row) for name in list(found)[1:]} for row in (BOTH, OWN, P50, P99)}
+    told = {row: {name: _against(found, name, row) for name in ours} for row in (BOTH, OWN, P50, P99)}
     for row, each in told.items():
         cells = [
             f"{_signed(one.median, row)} ({_signed(one.lowest, row)} to {_signed(one.highest, row)})"
@@ -210,9 +222,14 @@ def differences(found: dict[str, list[Round]]) -> list[str]:
     panels_cost = told[BOTH][PANELS]
     under = "less" if panels_cost.highest < MOST_PERCENT else "not surely less"
     sentences.append(f"- What three panels cost of both processes is {under} than {MOST_PERCENT} % of {CORES} cores.")
-    for name in list(found)[1:]:
+    for name in ours:
         said = [_sentence(row, told[row][name]) for row in (OWN, P50, P99)]
         sentences.append(f"- {name[0].upper()}{name[1:]}: {'; '.join(said)}.")
+    more = difference([PAGES.of(each) for each in found[BROWSERS]], [PAGES.of(each) for each in found[PEER]])
+    sentences.append(
+        f"- NiceGUI's page takes {_signed(more.median, PAGES)} ({_signed(more.lowest, PAGES)} to "
+        f"{_signed(more.highest, PAGES)}) {PAGES.unit} against this page, for the same three browsers."
+    )
     confidence = told[P99][PANELS].confidence
     note = (
         "Median of the rounds' differences, and the interval that holds the true median with "

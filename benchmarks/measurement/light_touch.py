@@ -19,7 +19,7 @@ from station.twin.gel import Gel
 from station.twin.squeeze import Squeeze
 from station.vision.constants import CONSTANTS
 from station.vision.contact import Image
-from station.vision.methods import median_image
+from station.vision.median import median_image
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image
 

@@ -17,7 +17,7 @@ from station.twin.fruit import Fruit, draw_fruit
 from station.twin.gel import MM_PER_PX, Gel
 from station.twin.squeeze import Squeeze
 from station.vision.contact import Image
-from station.vision.methods import median_image
+from station.vision.median import median_image
 from station.vision.press import PressTracker
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image, measure_step

@@ -15,7 +15,7 @@ from measurement.peers import PEER, contact_area_idea
 from station.settings.segmentation import RobustParameters
 from station.twin.gel import MM_PER_PX
 from station.vision.contact import Contact
-from station.vision.methods import median_image
+from station.vision.median import median_image
 from station.vision.press import PressTracker
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image, measure_step

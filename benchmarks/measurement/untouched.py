@@ -9,7 +9,7 @@ from measurement.peers import PEER, contact_area_idea
 from station.settings.segmentation import RobustParameters
 from station.twin.digit.sensor import DigitSensor
 from station.vision.contact import Contact
-from station.vision.methods import median_image
+from station.vision.median import median_image
 from station.vision.robust import RobustMethod
 from station.vision.step import mean_image, measure_step
 from station.vocabulary import Flag
