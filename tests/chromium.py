@@ -1,4 +1,6 @@
-"""Arguments of a Chromium under test."""
+"""Chromium under test: its arguments, and a click that waits for its page."""
+
+from playwright.sync_api import Locator
 
 _WITHOUT = (
     # They keep a process ready for the address bar's suggestions: half a second of a core for each window.
@@ -18,3 +20,9 @@ ARGUMENTS = (
     f"--disable-features={','.join(_WITHOUT)}",
 )
 """Headless, in a container, without what a person's browser does in its background."""
+
+
+def follow(lead: Locator) -> None:
+    """Click what leads to another page, and wait until that is loaded, which Playwright's own click does not."""
+    with lead.page.expect_navigation():
+        lead.click()

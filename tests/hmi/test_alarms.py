@@ -4,6 +4,8 @@ import re
 
 import pytest
 
+from tests.chromium import follow
+
 
 @pytest.mark.timeout(240)
 def test_the_life_of_an_alarm(ready, operator, eventually):
@@ -13,10 +15,10 @@ def test_the_life_of_an_alarm(ready, operator, eventually):
         operator.until(".alarm-line", "tactile camera gives no frames")
         alarm = operator.page.locator(".alarm", has_text="tactile camera gives no frames")
         assert "not acknowledged" in alarm.inner_text()
-        alarm.get_by_role("button", name="Acknowledge").click()
+        follow(alarm.get_by_role("button", name="Acknowledge"))
         operator.until(".alarm", "acknowledged · since")
         ready.until(lambda state: [a.state for a in state.alarms if a.alarm == "camera_lost"] == ["acknowledged"])
-        operator.page.locator(".alarm", has_text="camera").get_by_role("link", name="Details").click()
+        follow(operator.page.locator(".alarm", has_text="camera").get_by_role("link", name="Details"))
         assert "Check the camera's cable" in operator.text("article")
         assert "Triggers are refused" in operator.text("article")
         for width, height in ((390, 844), (1280, 800)):
@@ -27,7 +29,7 @@ def test_the_life_of_an_alarm(ready, operator, eventually):
         operator.until("h2", "Shelved")
         assert "by Ana" in operator.text("main")
         assert "camera" not in operator.text(".alarm-line")
-        operator.page.get_by_role("button", name="Show again").click()
+        follow(operator.page.get_by_role("button", name="Show again"))
         operator.until(".alarm-line", "camera")
         operator.open("/maintenance/image")
         operator.until("main", "The camera sends no images: this is the last one.")
@@ -36,9 +38,9 @@ def test_the_life_of_an_alarm(ready, operator, eventually):
     finally:
         ready.twin(do="clear", device="camera")
     operator.until(".alarm", "returned to normal, not acknowledged")
-    operator.page.locator(".alarm", has_text="camera").get_by_role("button", name="Acknowledge").click()
+    follow(operator.page.locator(".alarm", has_text="camera").get_by_role("button", name="Acknowledge"))
     ready.until(lambda state: not any(a.alarm == "camera_lost" for a in state.alarms))
-    operator.page.locator("main").get_by_role("link", name="History").click()
+    follow(operator.page.locator("main").get_by_role("link", name="History"))
 
     def history():  # which is written behind
         operator.page.reload()

@@ -16,6 +16,7 @@ from station.channel.panel_live import (
 from station.messages import calibration
 from station.messages.message import verbatim
 from station.settings.recipe import load_recipes
+from tests.chromium import follow
 
 DUE = calibration.NEVER_VERIFIED(how=calibration.HOW_TO_VERIFY())
 
@@ -82,12 +83,12 @@ def test_an_open_page_follows_a_change_that_another_made(ready, panel):
 def test_the_fruit_is_changed_while_a_fruit_is_running(ready, operator):
     operator.open("/change")
     touches = 0
-    operator.page.locator(".fruit-tile", has_text="Raspberry").click()
+    follow(operator.page.locator(".fruit-tile", has_text="Raspberry"))
     touches += 1
     operator.page.get_by_role("heading", name="Change to Raspberry").wait_for()
     assert "Width of the fruit" in operator.text("table")
     sequence = ready.begin()
-    operator.page.get_by_role("button", name="Change to Raspberry").click()
+    follow(operator.page.get_by_role("button", name="Change to Raspberry"))
     touches += 1
     operator.until("main", "In progress|Done")
     outcome = ready.end(sequence)

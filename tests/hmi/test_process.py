@@ -5,6 +5,8 @@ import time
 
 import pytest
 
+from tests.chromium import follow
+
 
 @pytest.mark.timeout(240)
 def test_the_station_hangs_and_is_killed_under_an_open_page(ready, panel):
@@ -49,16 +51,16 @@ def test_a_persons_stop_and_the_last_fruit_outlive_a_killed_station(ready, opera
     operator.until(".run-activity", "Stopped")
     time.sleep(1.0)
     assert stands(ready.state()), "it does not begin by itself"
-    operator.page.locator(f".tile[href='/fruit/{soft.sequence}']").click()
+    follow(operator.page.locator(f".tile[href='/fruit/{soft.sequence}']"))
     operator.until("h1", f"Fruit {soft.sequence}")
     eventually(lambda: operator.page.locator(".fruit-picture").evaluate("picture => picture.naturalWidth") == 480)
     assert operator.page.locator(".fruit-curve circle").count() > 1
     operator.open("/")
-    operator.page.locator(f".tile[href='/fruit/{lost}']").click()
+    follow(operator.page.locator(f".tile[href='/fruit/{lost}']"))
     operator.page.wait_for_url(f"**/history/{lost}")
     operator.until("main", "No result")
     operator.open("/")
-    operator.page.get_by_role("button", name="Start").click()
+    follow(operator.page.get_by_role("button", name="Start"))
     ready.until(lambda state: state.ready)
     operator.until(".run-activity", "Ready")
 

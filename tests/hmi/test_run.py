@@ -5,6 +5,8 @@ from math import atan, degrees
 
 import pytest
 
+from tests.chromium import follow
+
 MM_A_PX = 25.4 * 10.1 / (1280**2 + 800**2) ** 0.5
 CAPITALS_PX = """(selector) => [...document.querySelectorAll(selector)].map((each) => {
   const pen = document.createElement("canvas").getContext("2d");
@@ -54,7 +56,7 @@ def test_a_fruit_is_shown_with_its_curve_and_its_picture(ready, panel, eventuall
     drawn = viewer.context.request.get(viewer.address + picture.get_attribute("src"))
     assert "<polygon" in drawn.text()
     assert drawn.headers["cache-control"].startswith("private, max-age=")
-    viewer.page.locator(".tile").first.click()
+    follow(viewer.page.locator(".tile").first)
     viewer.until("h1", f"Frucht {sequence}")
     viewer.until(".facts", f"Nummer\\s*{sequence}\\b")
     assert viewer.page.locator(".fruit-curve circle").count() > 1
@@ -70,7 +72,7 @@ def test_what_stops_has_to_be_held_and_works_by_keyboard(ready, operator, eventu
     operator.page.keyboard.up("Enter")
     ready.until(lambda state: state.state == "stopped" and state.stopping)
     operator.until(".run-activity", "Stopped")
-    operator.page.get_by_role("button", name="Start").click()
+    follow(operator.page.get_by_role("button", name="Start"))
     ready.until(lambda state: state.ready)
     operator.until(".run-activity", "Ready")
     # A touch that is too short, by the page's own clock: on a busy machine the browser's hand may be slow.

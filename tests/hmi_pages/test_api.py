@@ -57,6 +57,8 @@ def test_no_5xx_and_no_undocumented_answer(schema: Any, writing: str, method: st
     @settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow])
     @given(case=operation.as_strategy())
     def check(case: Any) -> None:
+        # Schemathesis escapes no percent sign of a path: a lot "%EA" would arrive as a byte that is no UTF-8.
+        case.path_parameters = {name: str(value).replace("%", "%25") for name, value in case.path_parameters.items()}
         case.call_and_validate(headers={"Authorization": f"Bearer {writing}"}, timeout=60)
 
     check()

@@ -16,6 +16,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from hmi.web.user_store import UserStore
 from station.records.database import FILE_NAME
+from tests.chromium import follow
 from tests.hmi_pages.conftest import PATIENCE_S, PATIENT_HANDSHAKE, PIN, Person, begun, free_port, quick_recipes
 from tests.hosts import fresh_host
 
@@ -147,8 +148,8 @@ def test_from_a_fresh_installation_to_the_first_fruit(fresh: Fresh, admin: Page)
     expect(page.locator("[data-step=gripper] .setup-says")).to_contain_text("jaws")
     assert page.evaluate("document.activeElement.id") == "setup-plc-1", "the focus stays as the page follows"
     assert page.evaluate("document.body.dataset.same") == "yes", "all this without a reload"
-    page.locator("[data-step=gripper]").get_by_role("link", name="Run").click()
-    page.get_by_role("button", name="Start").click()  # on a bench a person says that nothing is between the jaws
+    follow(page.locator("[data-step=gripper]").get_by_role("link", name="Run"))
+    follow(page.get_by_role("button", name="Start"))  # on a bench a person says that nothing is between the jaws
     page.goto(address)
     state_of(page, "gripper", "Done")
     state_of(page, "plc", "Next")
@@ -158,9 +159,9 @@ def test_from_a_fresh_installation_to_the_first_fruit(fresh: Fresh, admin: Page)
         state_of(page, step, "Done")
     state_of(page, "first", "Waits for: PLC, Recipe")
 
-    page.locator("[data-step=recipe]").get_by_role("link", name="Change fruit").click()
-    page.get_by_role("link", name="Strawberry").click()
-    page.get_by_role("button", name="Change").click()
+    follow(page.locator("[data-step=recipe]").get_by_role("link", name="Change fruit"))
+    follow(page.get_by_role("link", name="Strawberry"))
+    follow(page.get_by_role("button", name="Change"))
     page.goto(address)
     state_of(page, "recipe", "Done")
     line = ["line", "--fruit", "strawberry", "--damaged", "0", "--twin", fresh.console, "--every", "2"]
@@ -168,7 +169,7 @@ def test_from_a_fresh_installation_to_the_first_fruit(fresh: Fresh, admin: Page)
     state_of(page, "plc", "Done")
     state_of(page, "first", "Done")
     expect(page.get_by_text("The set-up is complete.")).to_be_visible()
-    page.locator("#setup-first-fruit").click()
+    follow(page.locator("#setup-first-fruit"))
     expect(page.get_by_role("heading", name=f"Fruit {fresh.first_measured()}", exact=True)).to_be_visible()
     page.goto(page.url.split("/history")[0])
     expect(page.get_by_text("The set-up of this station is not finished.")).to_have_count(0)

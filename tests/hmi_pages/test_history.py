@@ -9,6 +9,7 @@ from playwright.sync_api import expect
 
 from hmi.web.roles import Role
 from station.records.database import FILE_NAME, records_folder
+from tests.chromium import follow
 
 pytestmark = pytest.mark.timeout(400)
 
@@ -20,12 +21,12 @@ def test_a_fruit_is_found_by_its_number_and_its_page_says_why(orchard: Any, pane
     page = panel().go("/history")
     page.get_by_text("More conditions").click()
     page.get_by_label("Fruit number").fill(str(soft.sequence))
-    page.get_by_role("button", name="Search").click()
+    follow(page.get_by_role("button", name="Search"))
     expect(page.get_by_role("heading", name=f"Fruit {soft.sequence}")).to_be_visible()
     assert page.locator(".reasons li").count() == len(soft.reasons)
     assert page.locator(".mark-point").count() >= 2
     expect(page.get_by_text("fruit length 48.0 mm, class 3 (given by the PLC)")).to_be_visible()
-    page.locator(".steps a").nth(1).click()
+    follow(page.locator(".steps a").nth(1))
     expect(page.get_by_role("heading", name="Step 1")).to_be_visible()
     pictures = page.locator(".stages img")
     assert pictures.count() >= 8
@@ -65,12 +66,12 @@ def test_a_number_is_taken_as_people_write_it_and_one_that_is_none_is_said(orcha
     page = panel(locale="de").go("/history")
     page.get_by_text("Weitere Bedingungen").click()
     page.locator("[name=number]").fill("4.711")
-    page.locator("[role=search] .main").click()
+    follow(page.locator("[role=search] .main"))
     expect(page.locator("main")).to_contain_text("es gibt keine Prüfung 4711; aufgezeichnet sind")
     page = panel().go("/history")
     page.get_by_text("More conditions").click()
     page.locator("[name=number]").fill("fruit 7")
-    page.get_by_role("button", name="Search").click()
+    follow(page.get_by_role("button", name="Search"))
     expect(page.get_by_role("alert")).to_contain_text("Invalid search")
 
 
@@ -78,7 +79,7 @@ def test_a_search_by_fruit_shows_its_inspections(orchard: Any, panel: Any) -> No
     page = panel().go("/history")
     page.get_by_text("More conditions").click()
     page.get_by_role("radio", name="Strawberry").check(force=True)
-    page.get_by_role("button", name="Search").click()
+    follow(page.get_by_role("button", name="Search"))
     shown = [int(text) for text in page.locator(".row-number").all_inner_texts()]
     assert shown == [outcome.sequence for outcome in orchard.fruit][::-1][:20]
     assert panel().go("/history?fruit=raspberry").locator(".row-number").count() == 0
@@ -86,20 +87,20 @@ def test_a_search_by_fruit_shows_its_inspections(orchard: Any, panel: Any) -> No
 
 def test_one_touch_finds_todays_rejects(orchard: Any, panel: Any) -> None:
     page = panel().go("/history")
-    page.get_by_role("link", name="Today", exact=True).click()
-    page.get_by_role("link", name="Fail", exact=True).click()
+    follow(page.get_by_role("link", name="Today", exact=True))
+    follow(page.get_by_role("link", name="Fail", exact=True))
     assert page.locator(".chips [aria-current]").all_inner_texts() == ["Today", "Fail"]
 
     def shown() -> set[int]:
         return {int(text) for text in page.locator(".row-number").all_inner_texts()}
 
     today = shown()
-    page.get_by_role("link", name="The day before").click()
+    follow(page.get_by_role("link", name="The day before"))
     before = shown()  # fruit inspected before a midnight that has just passed
     assert not today & before
     rejects = today | before
     assert rejects == {outcome.sequence for outcome in orchard.fruit if outcome.outcome == "FAIL"}
-    page.get_by_role("link", name="The day before").click()
+    follow(page.get_by_role("link", name="The day before"))
     expect(page.get_by_text("Nothing was found.")).to_be_visible()
 
 
@@ -121,7 +122,7 @@ def test_a_table_and_a_lots_report_are_written_and_fetched(orchard: Any, panel: 
     person = panel("Quin")
     page = person.go("/history?fruit=strawberry")
     page.get_by_text("Tables and reports").click()
-    page.get_by_role("button", name="CSV").click()
+    follow(page.get_by_role("button", name="CSV"))
     expect(page.get_by_role("link", name="Save inspections.csv")).to_be_visible()
     page.set_viewport_size({"width": 390, "height": 844})
     assert page.evaluate(OVERFLOW) == 0
@@ -132,8 +133,8 @@ def test_a_table_and_a_lots_report_are_written_and_fetched(orchard: Any, panel: 
     page = person.go("/history")
     page.get_by_text("Tables and reports").click()
     page.get_by_label("Report of lot").fill("LOT 1")
-    page.get_by_role("button", name="Printable report").click()
-    page.get_by_role("link", name="Open lot.html").click()
+    follow(page.get_by_role("button", name="Printable report"))
+    follow(page.get_by_role("link", name="Open lot.html"))
     expect(page.get_by_text("Lot LOT 1").first).to_be_visible()
 
 
@@ -153,6 +154,6 @@ def test_the_arrows_lead_to_fruit_that_there_are(orchard: Any, panel: Any) -> No
 def test_a_job_that_is_done_cannot_be_cancelled(orchard: Any, panel: Any) -> None:
     page = panel("Quin").go("/history")
     page.get_by_text("Tables and reports").click()
-    page.get_by_role("button", name="Printable report").click()
+    follow(page.get_by_role("button", name="Printable report"))
     expect(page.get_by_role("link", name="Open lot.html")).to_be_visible()
     expect(page.get_by_role("button", name="Cancel")).to_be_hidden()

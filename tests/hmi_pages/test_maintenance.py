@@ -12,6 +12,7 @@ from playwright.sync_api import Page, expect
 
 from station.records.audit_report import read_audit
 from station.records.database import reading
+from tests.chromium import follow
 
 pytestmark = pytest.mark.timeout(400)
 
@@ -46,24 +47,24 @@ def test_jogging_is_refused_out_of_manual_mode_and_done_in_it(
     assert "The station is in mode 1" in refused.text()
     eventually(lambda: [row for row in audited(orchard, "maintenance.jog") if row.who == "Max"])
     page = person.go("/maintenance/hand")
-    page.get_by_role("button", name="Set manual mode").click()
+    follow(page.get_by_role("button", name="Set manual mode"))
     expect(page.get_by_role("button", name="Back to production")).to_be_visible()
     page.get_by_label("To the width, mm").fill("40,4")
-    page.get_by_role("button", name="Move", exact=True).click()
+    follow(page.get_by_role("button", name="Move", exact=True))
     told = page.get_by_text(re.compile(r"The fingers are at [\d.]+ mm"))
     expect(told).to_be_visible()
     width_mm = float(re.findall(r"[\d.]+", told.inner_text())[0])
     assert abs(width_mm - 40.4) < 0.3
     assert not orchard.state().ready
     expect(page.locator("[data-poll] .big")).to_have_text(f"{width_mm:.1f} mm")
-    page.get_by_role("button", name="+ 1 mm").click()
+    follow(page.get_by_role("button", name="+ 1 mm"))
     expect(told).not_to_contain_text(f"{width_mm:.1f}")
     wider_mm = float(re.findall(r"[\d.]+", told.inner_text())[0])
     assert 0.5 < wider_mm - width_mm < 1.5
     width_mm = wider_mm
-    page.get_by_role("button", name="Open", exact=True).click()
+    follow(page.get_by_role("button", name="Open", exact=True))
     expect(told).not_to_contain_text(f"{width_mm:.1f}")
-    page.get_by_role("button", name="Back to production").click()
+    follow(page.get_by_role("button", name="Back to production"))
     expect(page.get_by_role("button", name="Set manual mode")).to_be_visible()
     assert orchard.state().mode == 1
 
@@ -145,11 +146,11 @@ def test_an_administrator_edits_the_configuration_and_takes_it_back(
     file = orchard.home.parent / "station.yaml"
     before = file.read_text()
     page = panel("Ada").go("/maintenance")
-    page.get_by_role("link", name="Configuration").click()
+    follow(page.get_by_role("link", name="Configuration"))
     text = page.get_by_label("Text of the file")
     expect(text).to_have_value(before)
     text.fill(f"# why\n{before}\nmodbus: 3\n")
-    page.get_by_role("button", name="Check and save").click()
+    follow(page.get_by_role("button", name="Check and save"))
     expect(page.locator("[data-mistakes]")).to_contain_text("Line 3")
     assert file.read_text() == before
     found = [each for each in Axe().run(page).response["violations"] if each["impact"] in {"serious", "critical"}]
@@ -158,10 +159,10 @@ def test_an_administrator_edits_the_configuration_and_takes_it_back(
         page.set_viewport_size({"width": width_px, "height": 800})
         assert page.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth"), width_px
     text.fill(before.replace('"idle_s": 3600.0', '"idle_s": 3000.0'))
-    page.get_by_role("button", name="Check and save").click()
+    follow(page.get_by_role("button", name="Check and save"))
     expect(page.get_by_text("Saved. It takes effect at the next start.")).to_be_visible()
     assert '"idle_s": 3000.0' in file.read_text()
-    page.get_by_role("button", name="Put the former file back").click()
+    follow(page.get_by_role("button", name="Put the former file back"))
     expect(page.get_by_label("Text of the file")).to_have_value(before)
     assert file.read_text() == before
     rows = eventually(lambda: (all_ := audited(orchard, "panel.configuration_saved"))[1:] and all_)

@@ -14,6 +14,7 @@ from station.records.database import reading
 from station.records.marks import place_mark
 from station.records.short_transaction import short_transaction
 from station.settings.recipe import load_recipes
+from tests.chromium import follow
 
 pytestmark = pytest.mark.timeout(400)
 
@@ -37,7 +38,7 @@ def test_a_draft_is_written_shown_on_past_curves_rejected_and_another_approved(o
     edit(page, "damage.area[0].area_mm2", "96,5")
     expect(mark).not_to_have_attribute("d", before or "")
     page.locator("[name=reason]").fill("softer fruit were let through")
-    page.get_by_role("button", name="Save as a draft").click()
+    follow(page.get_by_role("button", name="Save as a draft"))
     expect(page.get_by_text("waits for approval")).to_be_visible()
     expect(page.get_by_role("cell", name="damage.area[0].area_mm2")).to_be_visible()
     assert page.get_by_role("button", name="Approve").count() == 0, "its author cannot approve it"
@@ -45,16 +46,16 @@ def test_a_draft_is_written_shown_on_past_curves_rejected_and_another_approved(o
 
     page = rosa.go("/recipes/strawberry")
     page.locator("form[action$='/approve'] [name=reason]").fill("too strict")
-    page.get_by_role("button", name="Reject").click()
+    follow(page.get_by_role("button", name="Reject"))
     expect(page.get_by_role("button", name="Restore the file")).to_be_visible()
     page = quin.go("/recipes/strawberry/edit")
     edit(page, "damage.area[0].area_mm2", "105")
     page.locator("[name=reason]").fill("a little softer")
-    page.get_by_role("button", name="Save as a draft").click()
+    follow(page.get_by_role("button", name="Save as a draft"))
     expect(page.get_by_text("waits for approval")).to_be_visible()
     page = rosa.go("/recipes/strawberry")
     page.locator("form[action$='/approve'] [name=reason]").fill("seen on the curves")
-    page.get_by_role("button", name="Approve").click()
+    follow(page.get_by_role("button", name="Approve"))
     expect(page.get_by_text("No difference from the recipe in force.")).to_be_visible()
     assert load_recipes(file.parent)["strawberry"].damage.area[0].area_mm2 == 105
     done = [(row.who, row.role, row.action) for row in audited(orchard, "recipe.")[:6]]
@@ -97,7 +98,7 @@ def test_a_bad_draft_is_refused_beside_the_form_and_nothing_is_written(orchard: 
     page = person.go("/recipes/raspberry/edit")
     edit(page, "damage.growth_mm2_per_mm", "9999")
     page.locator("[name=reason]").fill("a slip")
-    page.get_by_role("button", name="Save as a draft").click()
+    follow(page.get_by_role("button", name="Save as a draft"))
     expect(page.get_by_role("alert")).to_contain_text("growth_mm2_per_mm")
     assert page.locator('[name="v:damage.growth_mm2_per_mm"]').input_value() == "9999"
     assert file.read_text() == before
@@ -115,8 +116,8 @@ def test_a_viewer_is_shown_recipes_and_may_not_change_them(orchard: Any, panel: 
 
 def test_a_draft_is_tried_on_what_was_inspected(orchard: Any, panel: Any) -> None:
     page = panel("Quin").go("/recipes/strawberry")
-    page.get_by_role("button", name="What would it have decided?").click()
-    page.get_by_role("link", name="Open whatif.html").click()
+    follow(page.get_by_role("button", name="What would it have decided?"))
+    follow(page.get_by_role("link", name="Open whatif.html"))
     expect(page.get_by_text("What if: Strawberry").first).to_be_visible()
 
 
