@@ -99,7 +99,7 @@ class Alarm:
     id: AlarmId
     state: AlarmState = AlarmState.NORMAL
     detail: Message | None = None
-    """What was seen when it was last raised."""
+    """What was seen when it was last raised, or found since then."""
     since_s: float = 0.0
     """When it became active."""
     raised: int = 0

@@ -100,11 +100,16 @@ class AlarmManager:
             self._set(self.alarms.returned(alarm, time.time()), alarm, "cleared")
 
     def update(self, alarm: AlarmId, detail: Message | None) -> None:
-        """Raise the alarm with the finding, or clear it if there is none: the cause is gone."""
-        if detail is not None:
-            self.raise_(alarm, detail)
-        else:
+        """Raise the alarm with the finding, or clear it if there is none: the cause is gone.
+
+        A later finding takes the place of the one before, as the alarm's detail; the journal keeps the first.
+        """
+        if detail is None:
             self.clear(alarm)
+        elif alarm in self._present:
+            self.alarms = self.alarms.raise_(alarm, time.time(), detail)
+        else:
+            self.raise_(alarm, detail)
 
     def set_device_fault(self, device: str, fault: StationError | None) -> None:
         """Raise the alarm of the fault of the `arm`, `gripper` or `camera`, or clear the alarms of a healthy one."""

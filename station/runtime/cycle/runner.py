@@ -119,6 +119,10 @@ class CycleRunner:
         """Report an event from outside of the actions, with a reason for a person."""
         self._events.put_nowait(Happened(event, why, None))
 
+    async def taken(self) -> None:
+        """Wait until every event that was posted has been taken: the state is what they led to."""
+        await self._events.join()
+
     async def run(self) -> None:
         """Take events until cancelled; then what is under way is cancelled too."""
         try:
@@ -131,6 +135,7 @@ class CycleRunner:
                     pass
                 else:
                     await self._take(happened)
+                    self._events.task_done()
                 self._performer.tick()
         finally:
             await self._forget()

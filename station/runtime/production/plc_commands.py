@@ -263,10 +263,11 @@ class PlcCommands:
         return messages.BUSY_CALL_OFF() if busy else None
 
     async def _reset(self) -> Message | None:
-        service, state = self._service, self._service.state
+        service = self._service
+        await service.runner.taken()  # a stop may be on its way, which this reset comes after
         if why_not := self.reset_refusal():
             return why_not
-        self._stop_wanted = False
+        state, self._stop_wanted = service.state, False
         service.allow()
         await self._store_stop()
         if service.stopped_by_person:

@@ -5,6 +5,7 @@ import asyncio
 import pytest
 
 from station.channel.client import ChannelClient
+from station.channel.line import Command, CommandName
 from station.channel.panel import Actor
 from station.channel.panel_live import (
     GetPanelState,
@@ -16,6 +17,7 @@ from station.channel.panel_live import (
 from station.devices.gripper.errors import GripperUnreachableError
 from station.inspection.states import State
 from station.messages import commands
+from station.runtime.production.plc_commands import PlcCommands
 from station.settings.hmi import panel_endpoint
 
 
@@ -52,5 +54,25 @@ def test_a_start_after_a_stop_is_no_second_press_of_the_start_before_it(bench):
                 assert again.state == "executing"
                 cell.twin.boards["gripper"].clear()
                 await cell.reach(State.IDLE)
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_a_start_right_after_a_stop_starts_a_station_that_the_stop_has_yet_to_reach(bench, monkeypatch):
+    made, restore = [], PlcCommands.restore_stop
+    monkeypatch.setattr(PlcCommands, "restore_stop", lambda self: made.append(self) or restore(self))
+
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("strawberry")
+            service, orders = cell.station.service, made[0]
+            stopping = asyncio.create_task(orders.stop())
+            while not service.stopped_by_person:
+                await asyncio.sleep(0)
+            started = await orders.execute(Command(command=CommandName.RESET, argument=0))
+            assert started.done, started.why
+            await stopping
+            assert cell.phase is State.IDLE
 
     asyncio.run(scenario())
