@@ -1,13 +1,11 @@
 """What every test lives under: nothing may outlive it, and a missing tool is an error where CI says so."""
 
 import asyncio
-import contextlib
 import functools
 import gc
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -24,6 +22,7 @@ from hypothesis import HealthCheck, settings
 from threadpoolctl import threadpool_limits
 
 from station.cli import main
+from tests.ports import free_port, free_ports
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 KEPT = tuple(Path(__file__).parent / folder for folder in ("hmi_pages", "hmi"))
@@ -194,23 +193,13 @@ def chromium() -> str:
 @pytest.fixture
 def unused_port() -> int:
     """A loopback port that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+    return free_port()
 
 
 @pytest.fixture
 def unused_ports() -> Callable[[int], list[int]]:
     """Gives so many different loopback ports that nobody listens on."""
-
-    def choose(count: int) -> list[int]:
-        with contextlib.ExitStack() as stack:
-            probes = [stack.enter_context(socket.socket()) for _ in range(count)]
-            for probe in probes:
-                probe.bind(("127.0.0.1", 0))
-            return [probe.getsockname()[1] for probe in probes]
-
-    return choose
+    return free_ports
 
 
 @pytest.fixture(scope="session")

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, HTTPException, Path, Query
 from pydantic import BeforeValidator
+from starlette.convertors import Convertor, register_url_convertor
 
 from hmi.api.access import changer, reader
 from hmi.api.model import (
@@ -54,6 +55,19 @@ def _written_as_date(text: str) -> str:
     return text
 
 
+class _LotNames(Convertor[str]):
+    """Lots' names in a path: also those with a slash, but for one that ends in `/end`, which is an order."""
+
+    regex = "(?:(?!/end$).)+"
+
+    def convert(self, value: str) -> str:
+        return value
+
+    def to_string(self, value: str) -> str:
+        return value
+
+
+register_url_convertor("lot", _LotNames())
 router = APIRouter(prefix="/api/v1", responses=_REFUSED)
 Reader = Annotated[Actor, Depends(reader)]
 LotChanger = Annotated[Actor, Depends(changer(Right.RUN))]
@@ -139,7 +153,7 @@ async def lots(hmi: HmiNow, _: Reader, limit: Annotated[int, Query(ge=1, le=100)
     return LotList(lots=[LotAnswer.model_validate(each) for each in await hmi.past.lots(limit)])
 
 
-@router.get("/lots/{name}", tags=["lots"], responses=_NOT_FOUND)
+@router.get("/lots/{name:lot}", tags=["lots"], responses=_NOT_FOUND)
 async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAnswer:
     """One lot."""
     found = await hmi.past.lots(name=name)
@@ -148,14 +162,14 @@ async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAn
     return LotAnswer.model_validate(found[0])
 
 
-@router.put("/lots/{name}", tags=["lots"], responses=_UNREADABLE)
+@router.put("/lots/{name:lot}", tags=["lots"], responses=_UNREADABLE)
 async def begin_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()], begin: LotBegin) -> LotAnswer:
     """Begin a lot, by the name that the PLC gives with each trigger. Idempotent."""
     query = StartLot(name=name, grower=begin.grower, actor=actor)
     return LotAnswer.model_validate(await hmi.gateway.request(query, LotView, deadline_s=DEADLINE_S))
 
 
-@router.post("/lots/{name}/end", tags=["lots"], responses=_NOT_FOUND)
+@router.post("/lots/{name:lot}/end", tags=["lots"], responses=_NOT_FOUND)
 async def end_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()]) -> LotAnswer:
     """End a lot. Idempotent."""
     if not await hmi.past.lots(name=name):

@@ -2,7 +2,6 @@
 
 import contextlib
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ import pytest
 
 from station.twin.console import ask
 from tests.hosts import fresh_host
+from tests.ports import free_port
 
 
 @dataclass
@@ -70,12 +70,6 @@ def begun_cells(folder: Path) -> Iterator[Callable[..., Cell]]:
         cell.process.send_signal(signal.SIGINT)
         cell.process.communicate(timeout=20)
         assert cell.process.returncode == 0
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @pytest.fixture

@@ -6,7 +6,6 @@ import json
 import os
 import re
 import shutil
-import socket
 import subprocess
 import sys
 import time
@@ -47,15 +46,15 @@ from station.channel.panel_live import GetPanelState, PanelState
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
-from station.settings.recipe import load_recipes
 from station.twin.console import ask as ask_twin
 from tests.chromium import ARGUMENTS
 from tests.hosts import fresh_host
+from tests.ports import free_ports
+from tests.quick_recipes import NUMBERS, quick_recipes
 
 PATIENCE_S = 60.0
 ADMIN, ADMIN_PIN = "admin", "482915"
 OPERATOR, OPERATOR_PIN = "Ana", "7391"
-NUMBERS = {"strawberry": 1, "blueberry": 2, "raspberry": 3}
 KEEPER = """
 import os, subprocess, sys, time
 if os.fork():
@@ -88,32 +87,6 @@ def run_apart(work: Coroutine[Any, Any, Any]) -> Any:
     """Run in a loop of its own, in a thread of its own: Playwright's own loop runs in this one."""
     with ThreadPoolExecutor(1) as pool:
         return pool.submit(asyncio.run, work).result()
-
-
-def free_ports(count: int) -> list[int]:
-    with contextlib.ExitStack() as stack:
-        probes = [stack.enter_context(socket.socket()) for _ in range(count)]
-        for probe in probes:
-            probe.bind(("127.0.0.1", 0))
-        return [probe.getsockname()[1] for probe in probes]
-
-
-def quick_recipes(folder: Path) -> Path:
-    """The shipped recipes with few steps."""
-    folder.mkdir()
-    for name in NUMBERS:
-        values = load_recipes()[name].model_dump(mode="json")
-        limits_mm = [limit["closing_mm"] for limit in values["damage"]["area"]]
-        values["steps"] |= {"number": 4, "result_closings_mm": limits_mm, "closing_limit_mm": 4.5}
-        values["imaging"] |= {"settle_s": 0.2, "frames_per_step": 1, "reference_frames": 3}
-        values["damage"]["growth_mm2_per_mm"] = 60
-        # The unit is not calibrated and no grader tells a size: by a usual coverage no fruit would pass.
-        values["damage"].pop("size", None)
-        values["damage"]["uncertainty"] = {"coverage": 0.6, "repeatability": [{"closing_mm": 3.0, "relative": 0.03}]}
-        values["early_stop"] = {"area_mm2": 150, "growth_mm2_per_mm": 90}
-        values["expected_width"]["largest_mm"] = min(values["expected_width"]["largest_mm"], 42.0)
-        (folder / f"{name}.yaml").write_text(json.dumps(values))
-    return folder
 
 
 @dataclass
@@ -234,7 +207,7 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
     host = fresh_host()
     values = {
         "home": str(folder / "home"),
-        "recipes_folder": str(quick_recipes(folder / "recipes")),
+        "recipes_folder": str(quick_recipes(folder / "recipes", settle_s=0.2)),
         "modbus": {"port": modbus},
         "metrics": {"port": metrics},
         "hmi": {"port": hmi, "cleaning_s": 5},

@@ -8,7 +8,6 @@ import json
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -51,6 +50,7 @@ from station.twin.console import ask
 from station.vocabulary import Reason
 from tests.chromium import ARGUMENTS
 from tests.hosts import fresh_host
+from tests.ports import free_port
 
 PATIENCE_S = 120.0
 PATIENT_HANDSHAKE = {"begin_deadline_s": 10.0, "station_lost_after_s": 30.0, "plc_heartbeat_timeout_s": 30.0}
@@ -63,12 +63,6 @@ MEASURED = frozenset(list(Reason)[: list(Reason).index(Reason.REFERENCE_BAD)]) -
 _KEPT: list[int] = []
 """Processes of the site, which all modules share."""
 T = TypeVar("T")
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def eventually(what: Callable[[], T], patience_s: float = PATIENCE_S) -> T:

@@ -4,6 +4,7 @@ import re
 import time
 from collections.abc import Callable
 from typing import Any
+from urllib.parse import quote
 
 import pytest
 import schemathesis
@@ -105,6 +106,14 @@ def test_a_lot_is_begun_and_ended_and_the_trail_knows_by_whom(orchard: Any, api:
         ("writing", "operator", "lot.told"),
         ("writing", "operator", "lot.ended"),
     }
+
+
+def test_a_lots_name_may_have_a_slash_and_a_percent_sign(api: Any, writing: str) -> None:
+    name = "26/11 50% A"
+    for path in (f"/api/v1/lots/{quote(name)}", f"/api/v1/lots/{quote(name, safe='')}"):
+        assert api("PUT", path, token=writing, json_body={"grower": "Hof Süd"}).body["name"] == name
+        assert api("GET", path, token=writing).body["name"] == name
+        assert api("POST", f"{path}/end", token=writing).body["name"] == name
 
 
 @pytest.mark.parametrize("path", ["/api/v1/health", "/api/v1/inspections", "/api/v1/lots", "/api/v1/recipes"])

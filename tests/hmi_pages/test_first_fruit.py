@@ -17,8 +17,9 @@ from playwright.sync_api import Browser, Page, expect
 from hmi.web.user_store import UserStore
 from station.records.database import FILE_NAME
 from tests.chromium import follow
-from tests.hmi_pages.conftest import PATIENCE_S, PATIENT_HANDSHAKE, PIN, Person, begun, free_port, quick_recipes
+from tests.hmi_pages.conftest import PATIENCE_S, PATIENT_HANDSHAKE, PIN, Person, begun, quick_recipes
 from tests.hosts import fresh_host
+from tests.ports import free_port
 
 pytestmark = pytest.mark.timeout(600)
 

@@ -14,6 +14,8 @@ from typing import Any
 
 import pytest
 
+from tests.ports import free_port
+
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT_S = 60.0
 
@@ -73,9 +75,7 @@ class Broker:
     user, password = "station", "not for the log"
 
     def __init__(self, folder: Path) -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
+        self.port = free_port()
         self.password_file = folder / "mqtt-password"
         self.password_file.touch(0o600)
         self.password_file.write_text(self.password + "\n")

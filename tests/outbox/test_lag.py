@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-import socket
 import time
 
 import pytest
@@ -16,6 +15,7 @@ from station.outbox.status import DestinationStatus, outbox_folder, write_status
 from station.records.audit import AuditEntry
 from station.runtime.station import Station
 from station.settings.configuration import load_configuration
+from tests.ports import free_port
 
 AWAY = messages.NOT_YET_CONNECTED()
 LIMIT_S = 90.0
@@ -24,12 +24,6 @@ LIMIT_S = 90.0
 def ids(message):
     """The ids of a message and of what it encloses."""
     return set() if message is None else set(message.ids())
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ import asyncio
 import os
 import re
 import shutil
-import socket
 import time
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
@@ -29,6 +28,7 @@ from plc_interface.server.write_lock import WriterChange
 from station.channel.line import BeginReply, Open, Outcome, PackmlState, Reason, Refusal, StationState
 from station.settings.modbus import ModbusSettings
 from station.settings.plc import HandshakeSettings
+from tests.ports import free_port
 
 BEAT_S = 0.05
 
@@ -148,10 +148,7 @@ async def _beating(rig: Rig) -> None:
 
 @asynccontextmanager
 async def serving(order: WordOrder = WordOrder.HIGH_FIRST) -> AsyncIterator[Rig]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    rig = Rig(port, order)
+    rig = Rig(free_port(), order)
     await rig.server.start()
     beating = asyncio.create_task(_beating(rig))
     try:

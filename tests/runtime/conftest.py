@@ -5,7 +5,6 @@ import contextlib
 import itertools
 import json
 import os
-import socket
 import sys
 import time
 from collections.abc import AsyncIterator, Callable
@@ -41,20 +40,14 @@ from station.messages.message import verbatim
 from station.runtime.station import Station
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.plc import line_endpoint
-from station.settings.recipe import load_recipes
 from station.twin.process import Twin, TwinOptions
 from station.twin.robotiq import model
 from tests.hosts import fresh_host
+from tests.ports import free_port
+from tests.quick_recipes import NUMBERS, quick_recipes
 
 PATIENCE_S = 60.0
 LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
-NUMBERS = {"strawberry": 1, "blueberry": 2, "raspberry": 3}
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 async def eventually(what: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
@@ -175,25 +168,6 @@ class Bench:
         done = await self.line.order(CommandName.CHANGE_RECIPE, NUMBERS[kind])
         assert done.done, done.why
         self.lay(kind)
-
-
-def quick_recipes(folder: Path) -> Path:
-    """The shipped recipes with few, hasty steps."""
-    folder.mkdir(exist_ok=True)
-    for name in NUMBERS:
-        values = load_recipes()[name].model_dump(mode="json")
-        limits_mm = [limit["closing_mm"] for limit in values["damage"]["area"]]
-        values["steps"] |= {"number": 4, "result_closings_mm": limits_mm, "closing_limit_mm": 4.5}
-        values["imaging"] |= {"settle_s": 0.02, "frames_per_step": 1, "reference_frames": 3}
-        values["damage"]["growth_mm2_per_mm"] = 60
-        values["damage"].pop("size", None)
-        # The bench's unit is not calibrated: by a usual coverage its scale alone would keep every fruit from PASS.
-        values["damage"]["uncertainty"] = {"coverage": 0.6, "repeatability": [{"closing_mm": 3.0, "relative": 0.03}]}
-        values["early_stop"] = {"area_mm2": 150, "growth_mm2_per_mm": 90}
-        width = values["expected_width"]
-        width["largest_mm"] = min(width["largest_mm"], 42.0)
-        (folder / f"{name}.yaml").write_text(json.dumps(values))
-    return folder
 
 
 @pytest.fixture

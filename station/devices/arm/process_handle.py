@@ -30,6 +30,8 @@ class ArmProcess:
         self._process, self._channel, self._folder = process, channel, folder
         self._words: deque[str] = deque(maxlen=LAST_WORDS)
         self._listening = asyncio.create_task(self._listen(), name="words of the arm's process")
+        # One for all requests: a wait for a process that is cancelled leaves its future behind (Python 3.11).
+        self._ending = asyncio.create_task(process.wait(), name="end of the arm's process")
 
     @classmethod
     async def spawn(cls, host: str, frequency_hz: float) -> Self:
@@ -83,9 +85,8 @@ class ArmProcess:
             ArmFault: no answer in time, the process has ended, or it refused.
         """
         asking = asyncio.create_task(self._channel.request(request, reply, deadline_s=deadline_s))
-        dying = asyncio.create_task(self._process.wait())
         try:
-            await asyncio.wait({asking, dying}, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait({asking, self._ending}, return_when=asyncio.FIRST_COMPLETED)
             if asking.done():
                 return asking.result()
         except DeadlineError as error:
@@ -94,10 +95,9 @@ class ArmProcess:
         except ChannelError as error:
             raise ArmFault(ArmCause.DEADLINE, error.message) from error
         finally:
-            for task in (asking, dying):
-                task.cancel()
-            await asyncio.gather(asking, dying, return_exceptions=True)
-        code, output = dying.result(), " / ".join(self._words)
+            asking.cancel()
+            await asyncio.gather(asking, return_exceptions=True)
+        code, output = self._ending.result(), " / ".join(self._words)
         ended = messages.PROCESS_ENDED_AFTER(code=code, output=output) if output else messages.PROCESS_ENDED(code=code)
         raise ArmFault(ArmCause.LINK_LOST, ended)
 
@@ -106,7 +106,7 @@ class ArmProcess:
         with contextlib.suppress(ProcessLookupError):
             if not self.ended:
                 self._process.kill()
-        await self._process.wait()
+        await asyncio.wait({self._ending})
         await asyncio.gather(self._listening, return_exceptions=True)
         await self._channel.close()
         self._folder.cleanup()

@@ -39,11 +39,7 @@ class Bench:
 
     def forgive_no_silence(self) -> None:
         """Have the watchdog expire also where the controller stands still itself, as it does on a busy machine."""
-
-        def forgive_nothing(now_s: float) -> None:
-            pass
-
-        self.controller.script.stood_still = forgive_nothing
+        self.controller.script.stood_still = lambda _now_s: None
 
     def settings(self, **changes: object) -> ArmSettings:
         base: dict[str, object] = {

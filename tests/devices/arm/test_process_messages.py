@@ -1,6 +1,7 @@
 """What the ur-rtde process refuses, and what becomes of it, as messages; no controller is needed."""
 
 import asyncio
+import gc
 import os
 import signal
 
@@ -32,6 +33,27 @@ def test_a_refusal_a_silence_and_an_end_are_messages():
             ended = await fault_of(process, 30.0)
             assert ended.cause is ArmCause.LINK_LOST
             assert ended.detail == messages.PROCESS_ENDED(code=-signal.SIGKILL)
+        finally:
+            await process.end()
+
+    asyncio.run(run())
+
+
+def test_requests_leave_nothing_behind():
+    """Fifty a second for months: what each leaves is the station's memory."""
+
+    def futures() -> int:
+        gc.collect()
+        return sum(isinstance(each, asyncio.Future) for each in gc.get_objects())
+
+    async def run():
+        process = await ArmProcess.spawn("127.0.0.1", 125.0)
+        try:
+            await process.request(Halt(deceleration_rad_s2=1.0), Outcome, deadline_s=30.0)
+            before = futures()
+            for _ in range(100):
+                await process.request(Halt(deceleration_rad_s2=1.0), Outcome, deadline_s=30.0)
+            assert futures() < before + 10
         finally:
             await process.end()
 

@@ -20,6 +20,7 @@ from plc_interface.server.exceptions import Trouble
 from plc_interface.server.tls import ROLE_EXTENSION
 from station.errors import StationError
 from station.settings.modbus import ModbusTlsSettings
+from tests.ports import free_port
 
 REFERENCE = BY_NAME["reference_u16"].address
 DOCUMENT = Path(__file__).resolve().parents[3] / "docs" / "plc" / "server.md"
@@ -76,9 +77,7 @@ def authority(tmp_path):
 
 @pytest.fixture
 def tls_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+    return free_port()
 
 
 @pytest.fixture
