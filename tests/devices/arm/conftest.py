@@ -39,7 +39,11 @@ class Bench:
 
     def forgive_no_silence(self) -> None:
         """Have the watchdog expire also where the controller stands still itself, as it does on a busy machine."""
-        self.controller.script.stood_still = lambda _now_s: None
+
+        def forgive_nothing(now_s: float) -> None:
+            pass
+
+        self.controller.script.stood_still = forgive_nothing
 
     def settings(self, **changes: object) -> ArmSettings:
         base: dict[str, object] = {
