@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 import json
 import os
-import random
 import secrets
 import signal
 import socket
@@ -302,7 +301,7 @@ def _free_ports(count: int) -> list[int]:
     """Ports that no connection takes while a killed process is away: below those of outgoing connections."""
     ports = list[int]()
     while len(ports) < count:
-        port = random.randrange(_FIRST_PORT, _PORTS_END)
+        port = _FIRST_PORT + secrets.randbelow(_PORTS_END - _FIRST_PORT)  # tests seed `random`, all alike
         with socket.socket() as probe, contextlib.suppress(OSError):
             probe.bind((LOOPBACK, port))
             ports += [] if port in ports else [port]

@@ -102,7 +102,7 @@ class AlarmManager:
     def update(self, alarm: AlarmId, detail: Message | None) -> None:
         """Raise the alarm with the finding, or clear it if there is none: the cause is gone.
 
-        A later finding takes the place of the one before, as the alarm's detail; the journal keeps the first.
+        A later finding takes the place of the one before, as the alarm's detail; the alarms' history keeps the first.
         """
         if detail is None:
             self.clear(alarm)

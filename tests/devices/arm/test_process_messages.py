@@ -40,7 +40,7 @@ def test_a_refusal_a_silence_and_an_end_are_messages():
 
 
 def test_requests_leave_nothing_behind():
-    """Fifty a second for months: what each leaves is the station's memory."""
+    """They come many times a second, for months: what each one leaves adds up."""
 
     def futures() -> int:
         gc.collect()
