@@ -33,9 +33,13 @@ TOKEN = re.compile(r'data-token="([^"]+)"')
 
 
 def until_told(once: Callable[[], None], period_s: float, enough: Callable[[], bool] = lambda: True) -> None:
-    """Do something once a period until the input has ended and it is enough; a missed period is left out."""
-    due_s = time.monotonic()
+    """Do something once a period until the input has ended and it is enough; a missed period is left out.
+
+    It has begun after the first time: a client then has the connection that an attack is not to take.
+    """
+    once()
     print("begun", flush=True)
+    due_s = time.monotonic() + period_s
     while not (select.select([sys.stdin], [], [], max(0.0, due_s - time.monotonic()))[0] and enough()):
         once()
         due_s = max(due_s + period_s, time.monotonic())
@@ -58,7 +62,9 @@ def scan(port: int) -> dict[str, list[float] | int]:
             reply = client.recv(REPLY_BYTES, socket.MSG_WAITALL)
             if len(reply) != REPLY_BYTES or reply[:2] != struct.pack(">H", number):
                 raise ConnectionError("no whole reply")
-        except OSError:
+        except OSError as error:
+            if not errors:
+                print(f"scan: {error!r} after {len(took_ms)} scans", file=sys.stderr)
             errors += 1
             if client is not None:
                 client.close()
