@@ -14,6 +14,7 @@ ARGUMENTS = (
     "--disable-gpu",
     "--disable-quic",
     "--no-first-run",
+    "--disable-auto-reload",  # of a page that was refused, which would interrupt the next try to open it
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",

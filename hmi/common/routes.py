@@ -54,7 +54,8 @@ async def live(
     holder = f"person {caller.name}" if caller.name else address
     stream = Stream(holder, known=bool(caller.name) or hmi.pins.knows(address))
     events = hmi.live.stream(stream, tuple(dict.fromkeys(part)), locale, lambda: hmi.sessions.caller(caller.session))
-    return StreamingResponse(events, media_type="text/event-stream")
+    # Kept open for another request, the connection of a stream that has ended would keep its place.
+    return StreamingResponse(events, media_type="text/event-stream", headers={"connection": "close"})
 
 
 @router.get("/panel")

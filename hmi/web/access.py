@@ -95,6 +95,15 @@ def known(caller: Caller) -> Caller:
     return caller
 
 
-HmiNow = Annotated[Hmi, Depends(hmi_of)]
+# Async, though they await nothing: FastAPI hands any other function to a thread, for which each request would wait.
+async def _hmi(request: Request) -> Hmi:
+    return hmi_of(request)
+
+
+async def _locale(request: Request) -> Locale:
+    return locale_of(request)
+
+
+HmiNow = Annotated[Hmi, Depends(_hmi)]
 GenuineCaller = Annotated[Caller, Depends(genuine)]
-LocaleNow = Annotated[Locale, Depends(locale_of)]
+LocaleNow = Annotated[Locale, Depends(_locale)]

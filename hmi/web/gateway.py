@@ -40,7 +40,7 @@ class Gateway:
         self._endpoint, self._period_s = endpoint, period_s
         self._client: ChannelClient | None = None
         self._polling: asyncio.Task[None] | None = None
-        self._polled = asyncio.Event()
+        self._polled: asyncio.Future[None] | None = None
         self._known: tuple[str, int | None] | None = None
         """The station's start and last fruit of `last` and `recent`."""
         self.state: PanelState | None = None
@@ -106,9 +106,11 @@ class Gateway:
         except StationError as error:
             log.warning("the audit trail does not have it: %s", error)
 
-    async def polled(self) -> None:
-        """Wait for the end of the next poll, with or without an answer."""
-        await self._polled.wait()
+    def polled(self) -> asyncio.Future[None]:
+        """Return a future that is done at the end of the next poll, with or without an answer."""
+        if self._polled is None:
+            self._polled = asyncio.get_running_loop().create_future()
+        return self._polled
 
     async def _poll(self) -> None:
         while True:
@@ -120,8 +122,9 @@ class Gateway:
                     self.recent = await self.request(GetRecent(most=200), Recent)
                     self.last, self._known = await self._fruit(state.last_sequence), newest
                 self.state, self.heard_s = state, time.monotonic()
-            polled, self._polled = self._polled, asyncio.Event()
-            polled.set()
+            polled, self._polled = self._polled, None
+            if polled is not None:
+                polled.set_result(None)
             await asyncio.sleep(max(0.01, self._period_s - (time.monotonic() - began_s)))
 
     async def _fruit(self, sequence: int | None) -> Fruit | None:

@@ -102,7 +102,7 @@ class Live:
         yield f"retry: {AGAIN_MS}\n\n".encode()
         sent: dict[str, str] = {}
         loop, beat_at_s = asyncio.get_running_loop(), 0.0
-        while not self.ending and not stream.displaced:
+        while not self.ending and not stream.displaced.done():
             who = caller()
             filled = {name: self.part(name, locale, who.role) for name in names}
             news = {name: each for name, each in filled.items() if sent.get(name) != each.digest}
@@ -118,4 +118,5 @@ class Live:
                 }
                 yield f"data: {json.dumps(event, ensure_ascii=False)}\n\n".encode()
                 sent |= {name: each.digest for name, each in news.items()}
-            await self._gateway.polled()
+            # A displaced stream ends at once: until then its connection is one of those that its address may have.
+            await asyncio.wait({self._gateway.polled(), stream.displaced}, return_when=asyncio.FIRST_COMPLETED)

@@ -1,5 +1,6 @@
 """Places of the event streams: for one address or person so many; a new page takes the place of the oldest."""
 
+import asyncio
 import time
 
 MOST_STREAMS, RESERVED_STREAMS = 100, 100
@@ -17,8 +18,9 @@ class Stream:
     def __init__(self, holder: str, *, known: bool) -> None:
         self.holder, self.known = holder, known
         self.rank: tuple[float, ...] | None = (time.monotonic(),)
-        self.displaced = False
+        self.displaced: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        """Done once another page has the place."""
 
     def displace(self) -> None:
         """End: another page has the place."""
-        self.displaced = True
+        self.displaced.set_result(None)

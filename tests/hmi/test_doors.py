@@ -7,6 +7,7 @@ import resource
 import socket
 import ssl
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from urllib.parse import urlencode, urlsplit
 
@@ -165,15 +166,13 @@ def test_a_thousand_event_streams_take_no_panels(people, eventually, crowd, sour
     person, process = Visitor(people.address), people.process("hmi")
     person.log_in()
     files = process.num_fds()
-    crowd(people.address, 1000, source, STREAM)
+    with ThreadPoolExecutor(1) as pool:
+        coming = pool.submit(crowd, people.address, 1000, source, STREAM)
+        while not coming.done():
+            assert Visitor(people.address).ask("GET", "/people")[0] == 200
+        coming.result()
     eventually(lambda: process.num_fds() < files + 80)  # those of an address, and not its crowd: streams have no end
-
-    def served():
-        with contextlib.suppress(http.client.RemoteDisconnected, ConnectionError):
-            return Visitor(people.address).ask("GET", "/")[0] == 200
-        return False  # until the streams have ended that others displaced, all places of this address are taken
-
-    eventually(served)
+    assert Visitor(people.address).ask("GET", "/")[0] == 200
     panel = crowd(people.address, 1, NEIGHBOUR, STREAM)[0]
     panel.settimeout(PATIENCE_S)
     got = b""
