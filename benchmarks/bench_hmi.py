@@ -48,7 +48,7 @@ from station.settings.hmi import address_of
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT = ROOT / "docs" / "hmi-speed.md"
 HOST = "127.83.0.1"
-REFRESH_S, ROUNDS, SECONDS = 0.1, 9, 16.0
+REFRESH_S, ROUNDS, SECONDS = 0.1, 9, 12.0
 FRUIT_FIRST, START_S = 8, 400.0
 ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"

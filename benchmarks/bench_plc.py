@@ -35,7 +35,7 @@ HOST = "127.0.0.1"
 CLIENTS = (1, 8, 32)
 SCAN_US = 10_000
 ROUNDS = 3
-DURATION_S = 4.0
+DURATION_S = 3.0
 _UNLIMITED_PER_S = 10**9
 OURS, PLAIN, STOCK, LIBMODBUS = "this server", "this server, ordinary priority", "stock pymodbus", "libmodbus (C)"
 

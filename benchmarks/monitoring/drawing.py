@@ -88,6 +88,8 @@ def value_of(unit: str, value: float) -> str:
         return "yes" if value else "no"
     elif unit == "s" and value > 2 * 86_400:
         value, behind = value / 86_400, " days"
+    elif unit == "s" and value > 2 * 3_600:
+        value, behind = value / 3_600, " h"
     elif unit == "bytes":
         value, behind = next(((value / size, f" {name}B") for size, name in _PREFIXES if value >= size), (value, " B"))
     return f"{value:,.4g}{behind}"
@@ -122,6 +124,11 @@ def _lines(axes: Axes, panel: Panel, answers: list[tuple[dict[str, Any], Answer]
     axes.set_ylim(bottom=0)
     _over_time(axes)
     unit = panel.data["fieldConfig"]["defaults"]["unit"]
+    if unit.startswith("suffix:"):  # too long to stand beside each number
+        axes.set_title(unit.removeprefix("suffix:"), loc="right", fontsize=6.5, fontweight="normal", color="#555555")
+        unit = "none"
+    elif unit == "bool_yes_no":
+        axes.set_yticks((0, 1))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: value_of(unit, value)))
     axes.grid(color="#dddddd", linewidth=0.5)
     axes.spines[["top", "right"]].set_visible(False)

@@ -47,8 +47,7 @@ def result(name: str) -> Effect:
 
     def note(work: Work) -> None:
         work.update_journal(command_result=COMMAND_RESULT.code(name))
-        if name != "executing":
-            work.state.command_request = None
+        work.state.command_request = None
 
     return described(f"Result {name}.", note)
 

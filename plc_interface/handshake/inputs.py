@@ -172,6 +172,8 @@ def _acknowledged(work: Work, event: PlcWrote, rose: frozenset[str], *, changed:
     elif after and sequence:
         work.signals.append(Signal.ACKNOWLEDGE_AFTER)
     elif (by_bit and not left_high) or (changed and sequence not in {state.journal.acknowledged, state.taken}):
+        if state.journal.acknowledged < sequence <= state.journal.highest:
+            work.update_journal(disbelieved=sequence)
         work.signals.append(Signal.WRONG_ACKNOWLEDGEMENT)
 
 

@@ -47,6 +47,8 @@ def run(work: Work, sequence: int, pending: RequestBegin, deadline_s: float) -> 
     state.running = running(pending, sequence, work.at, within_s, station)
     if state.taken == sequence:
         state.taken = 0  # what runs has no outcome yet: the PLC's number was wrong, or of another station
+    if state.inputs.acknowledged_sequence == sequence:
+        work.update_journal(disbelieved=sequence)
     work.update_journal(accepted_id=pending.trigger_id, highest=sequence)
     work.start(Signal.RESULT_DEADLINE, within_s)
     work.actions.append(RequestOutcome(sequence, within_s))

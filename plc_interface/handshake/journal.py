@@ -42,6 +42,8 @@ class Journal(_Persistent):
     """The highest sequence that the station gave for an accepted trigger."""
     acknowledged: int = Field(default=0, ge=0, lt=2**32)
     """The PLC has taken everything up to here."""
+    disbelieved: int = Field(default=0, ge=0, lt=2**32)
+    """The last inspection that the PLC acknowledged before its outcome was shown: a start does not make that right."""
     accepted_id: int = Field(default=0, ge=0, le=65_535)
     """The last trigger id accepted."""
     lot: str = Field(default="", max_length=32)

@@ -80,7 +80,6 @@ def hide(work: Work, outcome: Outcome) -> None:
         verdicts=(*journal.verdicts, outcome)[-MOST_UNNOTED:], hidden=(*journal.hidden, outcome.sequence)
     )
     work.actions.append(NotifyPublished(outcome))
-    pass_over_hidden(work)
 
 
 def pass_over_hidden(work: Work) -> None:

@@ -35,9 +35,12 @@ def take_unwritten(work: Work, sequence: int) -> None:
 
     Args:
         work: the PLC's first write.
-        sequence: the one in it; what is not known yet is taken once the station reports it.
+        sequence: the one in it; what is not known yet is taken once the station reports it. A number that was written
+            before its inspection had an outcome takes none.
     """
     state = work.state
+    if sequence == state.journal.disbelieved:
+        return
     state.taken = sequence
     if any(outcome.sequence == sequence for outcome in state.queue):
         state.queue = tuple(outcome for outcome in state.queue if outcome.sequence > sequence)

@@ -58,7 +58,7 @@ COUNTERS = (
 """Counters, by the names of the register map; all wrap round at 2³²."""
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class State:
     """The modes of all regions and their data. Only `machine.step` makes one from another."""
 
@@ -124,7 +124,7 @@ class State:
     command_changes_recipe: bool = False
 
     counters: Mapping[str, int] = field(default_factory=lambda: dict.fromkeys(COUNTERS, 0))
-    reset_utc_ms: int = 0
+    reset_utc_ms: int
     unlisted: int = 0
     """Pairs of mode and signal that came and are not in the table: refused."""
     stale: int = 0

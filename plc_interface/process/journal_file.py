@@ -78,7 +78,8 @@ class JournalFile:
             durable: wait for the disk, so that it outlives a loss of power too.
         """
         try:
-            self._replace(journal.model_dump_json().encode(), durable=durable)
+            # Without what is as it is at first: a version that does not know a field reads the journal all the same.
+            self._replace(journal.model_dump_json(exclude_defaults=True).encode(), durable=durable)
         except OSError as error:
             trouble = messages.JOURNAL_NOT_WRITTEN(file=str(self._path), error=str(error.strerror))
             if trouble != self.trouble:

@@ -35,6 +35,11 @@ def test_every_state_is_told_and_reached(cycle_model):
         assert not facts.needs_person or "confirm" in str(facts.reason)
 
 
+def test_who_waits_is_told_of_an_inspection_under_way_that_it_has_to_end():
+    for facts in STATES.values():
+        assert (facts.reason == facts.activity) is (facts.refusal is not Refusal.BUSY)
+
+
 def test_no_row_is_dead_and_none_is_there_twice(cycle_model):
     reached = {(world.state, event) for world, events in cycle_model.items() for event in events}
     assert set(TABLE) <= reached

@@ -206,14 +206,26 @@ def test_a_contact_whose_edge_was_lost_proves_a_fail_and_never_carries_a_pass():
     assert spoiled.findings[0].message.id == messages.EDGE_LOST.id
 
 
-@pytest.mark.parametrize("flag", [Flag.LOW_CONFIDENCE, Flag.LOWER_BOUND])
-def test_a_doubtful_step_at_an_earlier_limit_is_settled_by_a_trusted_one_within_the_last_limit(flag):
+def test_the_least_confidence_itself_is_enough():
+    assert judge(spoilt(pressed(20), 4.0, confidence=0.5), STRAWBERRY).outcome == "PASS"
+
+
+def test_a_contact_that_is_cut_and_whose_edge_was_lost_is_a_lower_bound_too():
+    flags = (Flag.CUT_BY_BORDER, Flag.LOWER_BOUND)
+    over = Press(35.0, 0.0, tuple(point(float(c), 45.0 * c, *flags[: 2 * (c == 4)]) for c in range(6)))
+    assert Reason.AREA_OVER_LIMIT in judge(over, STRAWBERRY).reasons
+
+
+@pytest.mark.parametrize(
+    "flags", [(Flag.LOW_CONFIDENCE,), (Flag.LOWER_BOUND,), (Flag.LOW_CONFIDENCE, Flag.LOWER_BOUND)]
+)
+def test_a_doubtful_step_at_an_earlier_limit_is_settled_by_a_trusted_one_within_the_last_limit(flags):
     two_limits = recipe_with("strawberry", {4: 98, 8: 189}, 41, (190, 55))
     press = pressed(20)
-    assert judge(spoilt(press, 4.0, flag), two_limits).outcome == "PASS"
-    over = spoilt(press, 4.0, flag, area_mm2=100.0)
+    assert judge(spoilt(press, 4.0, *flags), two_limits).outcome == "PASS"
+    over = spoilt(press, 4.0, *flags, area_mm2=100.0)
     assert judge(over, two_limits).outcome != "PASS", "what was measured there still keeps the earlier limit"
-    assert judge(spoilt(spoilt(press, 4.0, flag), 8.0, flag), two_limits).outcome == "NO_RESULT"
+    assert judge(spoilt(spoilt(press, 4.0, *flags), 8.0, *flags), two_limits).outcome == "NO_RESULT"
 
 
 def test_an_edge_that_was_lost_and_found_again_proves_no_growth():

@@ -8,7 +8,7 @@ import pytest
 from station.inspection.fruit_size import FruitSize
 from station.inspection.judge import judge
 from station.inspection.press import Measured, Press
-from station.inspection.second_press import needs_second_press, together
+from station.inspection.second_press import PRESS_AGAIN_AT, needs_second_press, together
 from station.settings.recipe import load_recipe
 from station.vocabulary import Flag, Reason
 
@@ -56,6 +56,13 @@ class TestLooksAgain:
         verdict = judge(near(), RECIPE)
         assert verdict.reasons == (Reason.NEAR_LIMIT,)
         assert needs_second_press(verdict)
+
+    def test_for_all_such_reasons_at_once(self):
+        verdict = judge(press(SOUND_MM2, Flag.SATURATED), RECIPE)
+        every = sorted({*PRESS_AGAIN_AT, Reason.EARLY_STOP})
+        assert needs_second_press(
+            replace(verdict, findings=tuple(replace(verdict.findings[0], reason=reason) for reason in every))
+        )
 
     @pytest.mark.parametrize("outcome", ["PASS", "FAIL"])
     def test_what_is_decided_is_not_pressed_again(self, outcome):
@@ -163,3 +170,23 @@ def test_a_lower_bound_of_both_kinds_counts_with_its_pixels():
     bound = press((2.0, 10.0, 16.5, 30.0), Flag.CUT_BY_BORDER, Flag.LOWER_BOUND)
     last = together((bound, press())).points[-1]
     assert (last.area_mm2, last.area_px, last.flags) == (30.0, 42_000, frozenset())
+
+
+def with_last(measured: Press, **changes) -> Press:
+    return replace(measured, points=(*measured.points[:-1], replace(at_3_mm(measured), **changes)))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"confidence": None},
+        {"area_mm2": 0.0, "area_px": 0},
+        {"flags": frozenset({Flag.LOWER_BOUND})},
+    ],
+    ids=["of no confidence", "of no area", "whose edge was lost"],
+)
+@pytest.mark.parametrize("first", [True, False])
+def test_an_edge_beside_one_gains_no_confidence_from_it(changes, first):
+    ordinary, other = weak(26.0, 0.45), with_last(weak(26.0, 0.45), **changes)
+    presses = (other, ordinary) if first else (ordinary, other)
+    assert at_3_mm(together(presses)) == at_3_mm(presses[-1])

@@ -340,6 +340,11 @@ def test_sizes_that_contradict_each_other_are_refused(sized, write, old, new, ex
 def test_the_limits_that_decide(small, write, decided_by, deciding_mm, passing_mm):
     damage = load_recipe(write(small.replace("damage:\n", f"damage:\n  decided_by: {decided_by}\n"))).damage
     assert (damage.deciding_closing_mm, damage.passing_closing_mm) == (deciding_mm, passing_mm)
+    last = damage.area[-1].model_copy(update={"closing_mm": 9.0})
+    three = damage.model_copy(update={"area": (*damage.area, last)})
+    first_mm = damage.area[0].closing_mm
+    assert three.deciding_closing_mm == (9.0 if decided_by == "every_limit" else first_mm)
+    assert three.passing_closing_mm == (first_mm if decided_by == "first_trusted" else 9.0)
 
 
 def test_the_guard_band_has_the_coverage_of_a_normal_distribution(small, write):

@@ -1,5 +1,7 @@
 """A start from the journal, and what the station says it holds open, settled."""
 
+import pytest
+
 from plc_interface.handshake import actions as do
 from plc_interface.handshake import events as ev
 from plc_interface.handshake.journal import Journal
@@ -13,6 +15,7 @@ def test_a_trigger_that_was_pending_at_the_end_counts_as_one_that_was_missed(ben
     assert (counters["count_triggers"], counters["count_missed"]) == (1, 1)
     assert sum(counters.values()) == 2
     assert (made.state.missed, made.state.last_refusal, made.state.last_refused_id) == (True, Refusal.STATION_LOST, 7)
+    assert (made.state.journal.asked_id, made.state.journal.disowned) == (None, (7,))
     assert not any(bench().state.counters.values())
 
 
@@ -51,3 +54,27 @@ def test_an_outcome_in_the_stations_place_has_the_fruits_size(bench):
     (outcome,) = made.state.queue
     assert (outcome.outcome, outcome.reasons) == ("NO_RESULT", (Reason.STATION_LOST,))
     assert (outcome.fruit_length_mm_x10, outcome.size_class) == (480, 3)
+
+
+def test_the_running_inspections_outcome_is_asked_for_again_after_a_lost_answer(bench):
+    made = bench()
+    made.run()
+    (asked,) = made.of(do.RequestOutcome)
+    made.feed(ev.OutcomeFailed, 41, "no answer")
+    made.link(Open(running=(41, 7), outcomes=()))
+    assert made.of(do.RequestOutcome) == [asked, asked]
+    assert made.state.inspection is Inspection.RUNNING
+
+
+@pytest.mark.parametrize(("ran_s", "known_s"), [(0.5, 0.5), (-3.0, 0.0)])
+def test_an_inspection_that_ran_at_the_end_waits_for_the_station_as_long_as_it_may(bench, ran_s, known_s):
+    before = bench()
+    before.run()
+    running = before.state.running
+    began_utc_ms = before.at().utc_ms - round(1000 * ran_s)  # the clock may have been set back since
+    made = bench(Journal(running=running.model_copy(update={"began_utc_ms": began_utc_ms}), highest=41))
+    assert made.state.running.began_s == pytest.approx(made.now_s - known_s)
+    made.now_s += min(running.within_s, made.settings.station_lost_after_s)
+    made.feed(ev.Tick)
+    (outcome,) = made.state.queue
+    assert (outcome.sequence, outcome.outcome) == (41, "NO_RESULT")

@@ -1,5 +1,7 @@
 """The table by itself: corners that are hard to reach from outside, and what is made from it."""
 
+import zlib
+
 import pytest
 
 from plc_interface.handshake import actions as do
@@ -9,7 +11,7 @@ from plc_interface.handshake.journal import Journal
 from plc_interface.handshake.modes import Arming, Inspection, Link, Result, Signal, Trigger
 from plc_interface.handshake.state import Fault, restarted
 from plc_interface.handshake.table import REGIONS
-from plc_interface.handshake.view import line, result_values, view
+from plc_interface.handshake.view import line, lot_checksum, result_values, view
 from plc_interface.registers.map import BY_NAME
 from station.channel.line import BeginReply, LineFault, Open, Reason, Refusal
 from station.messages.message import verbatim
@@ -457,12 +459,22 @@ def test_values_beyond_their_registers_are_shown_at_the_bound(bench):
     assert shown["result_area_px"] == 2**32 - 2
 
 
-def test_counters_wrap_round(bench):
+def test_an_area_of_nothing_is_shown_as_none_at_all(bench):
+    assert result_values(bench().outcome(area_mm2=0.0))["result_area_mm2_x100"] == 0
+
+
+def test_a_lots_checksum_is_that_of_what_the_registers_show_of_it():
+    assert lot_checksum("GRÜN 7") == zlib.crc32(b"GR?N 7")
+    assert lot_checksum("") == 0
+
+
+@pytest.mark.parametrize(("counted", "after"), [(63, 64), (2**32 - 1, 0)])
+def test_counters_wrap_round_at_32_bits(bench, counted, after):
     made = bench()
-    made.state.counters = {**made.state.counters, "count_missed": 2**32 - 1}
+    made.state.counters = {**made.state.counters, "count_missed": counted}
     made.armed()
     made.write("enable", "trigger", trigger_id=0)
-    assert made.state.counters["count_missed"] == 0
+    assert made.state.counters["count_missed"] == after
 
 
 GATE_LOST = LineFault(part="can", what=verbatim("the gate is lost"))

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import json
 import os
 from pathlib import Path
 
@@ -19,6 +20,8 @@ def test_what_was_written_is_read(tmp_path):
     kept = Journal(boots=3, highest=9, hidden=(8,), command_sequence=1)
     file.write(kept, durable=True)
     assert file.read() == kept
+    written = json.loads((tmp_path / "plc" / "journal.json").read_text(encoding="utf-8"))
+    assert written == {"boots": 3, "highest": 9, "hidden": [8], "command_sequence": 1}, "no field that says nothing"
     file.close()
 
 

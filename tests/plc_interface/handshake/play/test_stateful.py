@@ -24,7 +24,7 @@ from plc_interface.handshake import actions as do
 from plc_interface.handshake import events as ev
 from plc_interface.handshake.journal import Journal
 from plc_interface.handshake.machine import step
-from plc_interface.handshake.modes import Arming, Link
+from plc_interface.handshake.modes import Arming, Link, Result
 from plc_interface.handshake.state import COUNTERS, Fault, State, restarted
 from plc_interface.handshake.view import lot_checksum, view
 from plc_interface.registers.map import BY_NAME
@@ -338,10 +338,27 @@ class Handshake(RuleBasedStateMachine):
         else:
             self.write(acknowledged_sequence=sequence)
 
+    def may_have_been_taken(self, sequence: int) -> bool:
+        """Of what a start finds open only the PLC's first write says whether it was taken before: that is believed.
+
+        A loss of power may have taken the outcome from the journal, or the acknowledgement.
+        """
+        running = {self.state.running.sequence} if self.state.running else set()
+        return self.state.result is Result.WITHHELD and sequence in running | {one.sequence for one in self.state.queue}
+
     @rule(sequence=st.integers(0, 140))
     def acknowledge_nonsense(self, sequence: int) -> None:
-        if sequence != self.seen["result_sequence"]:
+        if sequence != self.seen["result_sequence"] and not self.may_have_been_taken(sequence):
             self.write(control=self.control | {"acknowledge"}, acknowledged_sequence=sequence)
+
+    @rule(by_bit=st.booleans())
+    def acknowledge_early(self, by_bit: bool) -> None:
+        """The number of the inspection that runs, or of the next one, before there is an outcome."""
+        running = self.state.running
+        sequence = running.sequence if running else self.state.journal.highest + 1
+        if sequence != self.seen["result_sequence"] and not self.may_have_been_taken(sequence):
+            control = self.control | {"acknowledge"} if by_bit else self.control
+            self.write(control=control, acknowledged_sequence=sequence)
 
     @rule()
     def drop_acknowledge(self) -> None:

@@ -1,0 +1,103 @@
+"""Acknowledgements: by number, by bit, in either order, and wrong ones."""
+
+import pytest
+
+from plc_interface.handshake import events as ev
+from plc_interface.handshake.journal import Journal
+from plc_interface.handshake.modes import Result
+from plc_interface.handshake.state import Fault
+from station.channel.line import BeginReply, Open
+
+
+def shown(bench):
+    """Return a bench that shows the result 41."""
+    made = bench()
+    made.run()
+    made.feed(ev.OutcomeReceived, made.outcome())
+    assert made.state.published == 41
+    made.write("enable")
+    return made
+
+
+@pytest.mark.parametrize("bits", [("enable",), ("enable", "acknowledge")])
+def test_a_sequence_that_was_never_shown_is_a_wrong_acknowledgement(bench, bits):
+    made = bench()
+    made.armed()
+    made.write(*bits, acknowledged_sequence=1)
+    assert made.state.faults == (Fault.WRONG_ACKNOWLEDGEMENT,)
+
+
+@pytest.mark.parametrize("again", [41, 1])
+def test_the_bit_may_follow_the_number_once(bench, again):
+    made = shown(bench)
+    made.write("enable", acknowledged_sequence=41)
+    assert made.state.journal.acknowledged == 41
+    made.write("enable", "acknowledge")
+    assert (made.state.result, made.state.faults) == (Result.TAKEN, ())
+    made.write("enable")
+    made.write("enable", "acknowledge", acknowledged_sequence=again)
+    assert made.state.faults == (Fault.WRONG_ACKNOWLEDGEMENT,)
+
+
+def test_a_bit_in_the_first_write_after_a_start_has_confirmed_its_number(bench):
+    made = bench(Journal(queue=(shown(bench).state.queue[0],), highest=41))
+    made.feed(ev.WriterGranted)
+    made.write("enable", "acknowledge", acknowledged_sequence=41)
+    assert (made.state.queue, made.state.faults) == ((), ())
+    made.write("enable")
+    made.write("enable", "acknowledge")
+    assert made.state.faults == (Fault.WRONG_ACKNOWLEDGEMENT,)
+
+
+@pytest.mark.parametrize("register", ["acknowledged_sequence", "control"])
+def test_either_register_of_the_acknowledgement_is_a_first_write(bench, register):
+    made = bench(Journal(queue=(shown(bench).state.queue[0],), highest=41))
+    made.feed(ev.WriterGranted)
+    made.feed(ev.PlcWrote, made.inputs, frozenset({"trigger_id"}))
+    assert made.state.result is Result.WITHHELD
+    made.feed(ev.PlcWrote, made.inputs, frozenset({register}))
+    assert made.state.result is Result.PUBLISHED
+
+
+@pytest.mark.parametrize("early", ["before it begins", "while it runs"])
+@pytest.mark.parametrize("ended", [False, True], ids=["started again while it runs", "started again after its outcome"])
+def test_an_outcome_is_shown_although_the_plc_acknowledged_its_number_early(bench, early, ended):
+    before = bench()
+    before.armed()
+    if early == "before it begins":
+        before.write("enable", acknowledged_sequence=41)
+    before.write("enable", "trigger", trigger_id=7)
+    before.feed(ev.BeginAnswered, before.state.pending.number, BeginReply(sequence=41, deadline_s=2.0))
+    if early == "while it runs":
+        before.write("enable", "acknowledge", acknowledged_sequence=41)
+    assert before.state.faults == (Fault.WRONG_ACKNOWLEDGEMENT,)
+    outcome = before.outcome()
+    if ended:
+        before.feed(ev.OutcomeReceived, outcome)
+    made = bench(Journal.model_validate_json(before.state.journal.model_dump_json()))
+    made.feed(ev.WriterGranted)
+    made.write("enable", acknowledged_sequence=41)
+    if not ended:
+        made.link(Open(running=(41, 7), outcomes=()))
+        made.feed(ev.OutcomeReceived, outcome)
+    assert (made.state.result, made.state.published) == (Result.PUBLISHED, 41)
+    made.write("enable", "acknowledge")
+    assert made.state.journal.acknowledged == 41
+
+
+def test_an_outcome_behind_the_one_that_is_shown_is_not_taken_by_its_number(bench):
+    before = shown(bench)
+    before.write("enable", "buffer_results")
+    before.write("enable", "buffer_results", "trigger", trigger_id=8)
+    before.feed(ev.BeginAnswered, before.state.pending.number, BeginReply(sequence=42, deadline_s=2.0))
+    second = before.outcome().model_copy(update={"sequence": 42, "trigger_id": 8})
+    before.feed(ev.OutcomeReceived, second)
+    before.write("enable", "buffer_results", acknowledged_sequence=42)
+    assert before.state.faults == (Fault.WRONG_ACKNOWLEDGEMENT,)
+    made = bench(before.state.journal)
+    made.feed(ev.WriterGranted)
+    for sequence in (41, 42):
+        made.write("enable", "buffer_results")
+        assert made.state.published == sequence
+        made.write("enable", "buffer_results", acknowledged_sequence=sequence)
+    assert made.state.queue == ()
