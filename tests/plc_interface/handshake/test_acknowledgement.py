@@ -101,3 +101,28 @@ def test_an_outcome_behind_the_one_that_is_shown_is_not_taken_by_its_number(benc
         assert made.state.published == sequence
         made.write("enable", "buffer_results", acknowledged_sequence=sequence)
     assert made.state.queue == ()
+
+
+def next_fruit(made, sequence, *bits):
+    """Another fruit, up to its shown result."""
+    made.write("enable", *bits)
+    made.write("enable", "trigger", *bits, trigger_id=sequence)
+    made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=sequence, deadline_s=2.0))
+    made.feed(ev.OutcomeReceived, made.outcome().model_copy(update={"sequence": sequence, "trigger_id": sequence}))
+    assert made.state.published == sequence
+
+
+def test_a_bit_that_the_plc_forgets_counts_as_fallen_until_it_is(bench):
+    made = shown(bench)
+    made.write("enable", "acknowledge", acknowledged_sequence=41)
+    assert made.state.result is Result.TAKEN
+    made.now_s += made.settings.handshake_timeout_s
+    made.feed(ev.Tick)
+    assert (made.state.result, made.state.faults) == (Result.EMPTY, (Fault.ACKNOWLEDGE_NOT_RESET,))
+    made.link()
+    next_fruit(made, 42, "acknowledge")
+    made.write("enable", "acknowledge", acknowledged_sequence=42)
+    assert made.state.result is Result.EMPTY
+    next_fruit(made, 43)
+    made.write("enable", "acknowledge", acknowledged_sequence=43)
+    assert made.state.result is Result.TAKEN
