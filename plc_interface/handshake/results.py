@@ -36,7 +36,7 @@ def take_unwritten(work: Work, sequence: int) -> None:
     Args:
         work: the PLC's first write.
         sequence: the one in it; what is not known yet is taken once the station reports it. A number that was written
-            before its inspection had an outcome takes none.
+            before its outcome was shown takes none.
     """
     state = work.state
     if sequence == state.journal.disbelieved:

@@ -26,8 +26,9 @@ class CommentedText:
     """
 
     def __init__(self, content: bytes, source: str, *, list_indent: int = 0) -> None:
-        if problems := parse_document(content, source).problems:
-            raise SettingsError(problems)
+        document = parse_document(content, source)
+        if document.problems:
+            raise SettingsError(document.problems)
         self._yaml = YAML(typ="rt")
         self._yaml.preserve_quotes = True
         self._yaml.width = _WIDE
@@ -35,8 +36,9 @@ class CommentedText:
         try:
             self.values: Any = self._yaml.load(content.decode("utf-8-sig"))
         except (YAMLError, ValueError) as error:  # it takes `.` and `_` for numbers
-            expected = messages.NOT_EDITABLE(error=shortened(str(error), 200))
-            raise SettingsError([Problem(messages.PATH(path=source), messages.FILE(), expected)]) from error
+            raise _not_editable(source, str(error)) from error
+        if self.values != document.value:  # such as a file that is one block of text: `>`, then `#`
+            raise _not_editable(source, "it can be read in two ways")
 
     def comment(self, values: Any, key: str, text: str) -> None:
         """Put a one-line comment behind a mapping's value, in place of the one there; comments on own lines stay."""
@@ -51,3 +53,8 @@ class CommentedText:
         text = io.StringIO()
         self._yaml.dump(self.values, text)
         return text.getvalue()
+
+
+def _not_editable(source: str, why: str) -> SettingsError:
+    expected = messages.NOT_EDITABLE(error=shortened(why, 200))
+    return SettingsError([Problem(messages.PATH(path=source), messages.FILE(), expected)])
