@@ -131,7 +131,7 @@ class State:
     """Answers that came after their question was settled otherwise."""
     faults: tuple[Fault, ...] = ()
 
-    journal: Journal = field(default_factory=Journal)
+    journal: Journal
 
     def mode(self, region: type[Mode]) -> Mode:
         """Return the mode of one region."""

@@ -16,7 +16,7 @@ from station.recipe_store.revision import Revision, Status
 from station.recipe_store.store import RecipeStore
 from station.records.clock import formatted
 from station.settings.configuration import load_configuration
-from station.settings.problems import SettingsError, shortened
+from station.settings.problems import SettingsError, shortened, shortened_file
 from station.settings.recipe import Recipe, check_recipes, recipe_files
 from station.settings.recipe_versions import content_sha256
 from station.settings.yaml_loader import parse_document
@@ -62,7 +62,7 @@ def check(context: click.Context, files: tuple[Path, ...], config: Path | None) 
     found = [path for file in files for path in (recipe_files(file) if os.path.isdir(file) else [file])]  # noqa: PTH112
     checked = check_recipes(dict.fromkeys(found))
     for path, recipe in checked.recipes.items():
-        click.echo(f"OK {shortened(str(path), 1000)}: {_format_recipe(recipe)}")
+        click.echo(f"OK {shortened_file(path)}: {_format_recipe(recipe)}")
     for problem in checked.problems:
         click.echo(str(problem), err=True)
     if checked.problems:

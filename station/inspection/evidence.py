@@ -71,6 +71,11 @@ class Evidence:
         self.points = _in_order([_at(point, named_mm) for point in press.points])
 
     @property
+    def reached_mm(self) -> float:
+        """The largest closing measured; 0 where none was."""
+        return self.points[-1].closing_mm if self.points else 0.0
+
+    @property
     def judged_from_mm(self) -> float:
         """The closing from which the curve says something."""
         return LIGHT_TOUCH * self._recipe.damage.area[0].closing_mm

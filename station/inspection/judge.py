@@ -404,7 +404,7 @@ def _reach(case: _Case, stopped: Stop | None) -> Iterator[Finding]:
     """Whether every damage threshold was reached, and whether the steps ended as they should."""
     evidence, recipe = case.evidence, case.limits.recipe
     missing = [limit for limit in recipe.damage.area if evidence.area_at(limit.closing_mm) is None]
-    reached_mm = evidence.points[-1].closing_mm if evidence.points else 0.0
+    reached_mm = evidence.reached_mm
     if stopped is None and (missing or not _almost(evidence, recipe)):
         if case.press.interruptions:  # which say why
             return
@@ -418,8 +418,7 @@ def _reach(case: _Case, stopped: Stop | None) -> Iterator[Finding]:
 
 def _almost(evidence: Evidence, recipe: Recipe) -> bool:
     """Whether the last result's closing was reached but for less than a step: a gripper has counts."""
-    reached_mm = evidence.points[-1].closing_mm if evidence.points else 0.0
-    return reached_mm > recipe.steps.result_closings_mm[-1] - recipe.steps.step_mm
+    return evidence.reached_mm > recipe.steps.result_closings_mm[-1] - recipe.steps.step_mm
 
 
 def _result(evidence: Evidence, recipe: Recipe, closing_mm: float) -> AreaAt:

@@ -13,7 +13,7 @@ from station.messages import recipes as messages
 from station.messages import settings as texts
 from station.recipe_store.recipe_state import ValidFile
 from station.recipe_store.revision import RecipeStoreError
-from station.settings.problems import Problem, SettingsError, shortened
+from station.settings.problems import Problem, SettingsError, shortened_file
 from station.settings.recipe import check_recipes, recipe_files
 from station.settings.recipe_versions import parse_recipe
 
@@ -43,24 +43,19 @@ def read_folder(folder: Path | None) -> Folder:
     for path in checked.recipes:
         try:
             text = path.read_text(encoding="utf-8-sig")
-            found.append(ValidFile(path, text, parse_recipe(text, _source(path))))  # as it is now, with its text
+            found.append(ValidFile(path, text, parse_recipe(text, shortened_file(path))))  # as it is now, with its text
         except (OSError, UnicodeDecodeError) as error:
             expected = texts.UNREADABLE(error=str(error))
-            problems.append(Problem(texts.LINE(file=_source(path), line=1), texts.FILE(), expected))
+            problems.append(Problem(texts.LINE(file=shortened_file(path), line=1), texts.FILE(), expected))
         except SettingsError as error:
             problems += error.problems
     good = {file.path.stem for file in found}
     broken = {
-        path.stem: [problem for problem in problems if problem.place.parameters.get("file") == _source(path)]
+        path.stem: [problem for problem in problems if problem.place.parameters.get("file") == shortened_file(path)]
         for path in files
         if path.stem not in good
     }
     return Folder(tuple(found), broken, tuple(problems))
-
-
-def _source(path: Path) -> str:
-    """Return a file's name in its problems."""
-    return shortened(str(path), 1000)
 
 
 @contextmanager

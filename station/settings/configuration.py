@@ -25,7 +25,7 @@ from station.settings.outbox import OutboxSettings
 from station.settings.paths import Folder
 from station.settings.plc import HandshakeSettings
 from station.settings.problems import Path as Where
-from station.settings.problems import Problem, SettingsError, dotted, field_name, shortened
+from station.settings.problems import Problem, SettingsError, dotted, field_name, shortened_file
 from station.settings.records import RecordsSettings
 from station.settings.schema import branches, leaves, schema_of
 from station.settings.service import ServiceSettings
@@ -133,7 +133,7 @@ def check_configuration(content: bytes, file: Path) -> Configuration:
         SettingsError: all problems of the environment and of the content.
     """
     check_size(content, file)
-    return _loaded(parse_document(content, shortened(str(file), 1000)), file, os.environ)
+    return _loaded(parse_document(content, shortened_file(file)), file, os.environ)
 
 
 def _loaded(document: Document, chosen: Path | None, environ: Mapping[str, str]) -> Configuration:

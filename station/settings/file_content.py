@@ -5,7 +5,7 @@ from pathlib import Path
 
 from station.messages import settings as messages
 from station.messages.message import Message
-from station.settings.problems import Problem, SettingsError, shortened
+from station.settings.problems import Problem, SettingsError, shortened_file
 
 LARGEST_FILE_BYTES = 64 * 1024
 
@@ -43,4 +43,4 @@ def check_size(content: bytes, path: Path) -> None:
 
 
 def _problem(path: Path, expected: Message) -> Problem:
-    return Problem(messages.LINE(file=shortened(str(path), 1000), line=1), messages.FILE(), expected)
+    return Problem(messages.LINE(file=shortened_file(path), line=1), messages.FILE(), expected)

@@ -1,6 +1,7 @@
 """Problems of a file or of the environment, each with its place."""
 
 from collections.abc import Iterable
+from pathlib import Path as FilePath
 from typing import NamedTuple
 
 from station.errors import BadInputError
@@ -8,6 +9,8 @@ from station.messages import settings as messages
 from station.messages.message import Message
 
 MOST_PROBLEMS = 50
+_LONGEST_FILE = 1000
+"""Characters of a file's name with its folders that a message shows: what a person made is shorter."""
 Path = tuple[str | int, ...]
 """Path of a value in nested mappings and lists: keys and positions, outermost first."""
 
@@ -28,6 +31,11 @@ def shortened(text: str, longest: int = 60) -> str:
     if len(text) > longest:
         text = text[: longest - 1] + "…"
     return text if text.isprintable() else text.encode("unicode_escape").decode()
+
+
+def shortened_file(path: FilePath) -> str:
+    """Return a file's or folder's name for a message's line."""
+    return shortened(str(path), _LONGEST_FILE)
 
 
 class Problem(NamedTuple):

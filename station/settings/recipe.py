@@ -10,7 +10,7 @@ from typing import NamedTuple
 from station.errors import BadInputError
 from station.messages import settings as messages
 from station.messages.message import Message
-from station.settings.problems import Problem, SettingsError, shortened
+from station.settings.problems import Problem, SettingsError, shortened, shortened_file
 from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import content_sha256, recipe_of
 from station.settings.yaml_loader import read_document
@@ -98,7 +98,7 @@ def recipe_files(folder: Path | None = None) -> list[Path]:
 
 
 def _folder_error(folder: Path, expected: Message) -> SettingsError:
-    return SettingsError([Problem(messages.PATH(path=shortened(str(folder), 1000)), messages.FOLDER(), expected)])
+    return SettingsError([Problem(messages.PATH(path=shortened_file(folder)), messages.FOLDER(), expected)])
 
 
 def shipped_folder() -> Path:
@@ -138,6 +138,6 @@ def check_recipes(files: Iterable[Path]) -> Checked:
             other = first.setdefault(value, path)
             if other != path:
                 clashing |= {other, path}
-                expected = messages.RECIPE_TWICE(value=str(value), file=shortened(str(other), 1000))
+                expected = messages.RECIPE_TWICE(value=str(value), file=shortened_file(other))
                 problems.append(Problem(*read_document(path).locate((field,)), expected))
     return Checked({path: recipe for path, recipe in recipes.items() if path not in clashing}, tuple(problems))

@@ -16,7 +16,7 @@ from station.messages import settings as messages
 from station.messages.message import Message
 from station.settings.file_content import read_content
 from station.settings.problems import Path as Where
-from station.settings.problems import Problem, field_name, shortened
+from station.settings.problems import Problem, field_name, shortened, shortened_file
 from station.settings.schema import found
 
 DEEPEST = 12
@@ -60,7 +60,7 @@ def read_document(path: Path) -> Document:
     Raises:
         SettingsError: the file cannot be read. Problems of its content are in the document's `problems`.
     """
-    return parse_document(read_content(path), shortened(str(path), 1000))
+    return parse_document(read_content(path), shortened_file(path))
 
 
 def parse_document(content: bytes, source: str) -> Document:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from station.inspection.evidence import Evidence
+from station.inspection.evidence import AT_MM, Evidence
 from station.inspection.judge import early_stop, judge
 from station.inspection.press import Measured, Press
 from station.inspection.sized_limits import sized_limits
@@ -72,6 +72,60 @@ def test_limits_that_are_met_exactly_are_kept():
     assert reasons(soft, with_limit(recipe, least_area_mm2=too_small)) == {Reason.LOW_CONFIDENCE}
 
 
+def with_growth_limit(recipe: Recipe, limit: float) -> Recipe:
+    return recipe.model_copy(update={"damage": recipe.damage.model_copy(update={"growth_mm2_per_mm": limit})})
+
+
+def test_growth_limits_that_are_met_exactly_are_kept():
+    recipe, soft = RECIPES[0], even(16.0)
+    growths = Evidence(soft, sized_limits(soft, recipe)).growths
+    most = max(growth.most_mm2_per_mm for growth in growths)
+    least = max(growth.least_mm2_per_mm for growth in growths)
+    assert reasons(soft, with_growth_limit(recipe, most)) == set()
+    assert reasons(soft, with_growth_limit(recipe, math.nextafter(most, 0))) == {Reason.NEAR_LIMIT}
+    assert reasons(soft, with_growth_limit(recipe, least)) == {Reason.NEAR_LIMIT}
+    assert reasons(soft, with_growth_limit(recipe, math.nextafter(least, 0))) == {Reason.GROWTH_OVER_LIMIT}
+
+
+def test_a_doubtful_step_is_excused_up_to_the_last_limit_itself():
+    recipe, soft = RECIPES[0], even(16.0)
+    *earlier, last = recipe.damage.area
+    area, uncertainty = Evidence(soft, sized_limits(soft, recipe)).area_at(last.closing_mm) or (0.0, 0.0)
+    points = tuple(replace(each, confidence=0.1) if each.closing_mm == 2.0 else each for each in soft.points)
+    for limit, found in (
+        (area + uncertainty, set()),
+        (math.nextafter(area + uncertainty, 0), {Reason.NEAR_LIMIT, Reason.LOW_CONFIDENCE}),
+    ):
+        area_limits = (*earlier, last.model_copy(update={"area_mm2": limit}))
+        damage = recipe.damage.model_copy(update={"area": area_limits})
+        assert reasons(replace(soft, points=points), recipe.model_copy(update={"damage": damage})) == found
+
+
+def test_a_step_as_far_before_a_threshold_as_may_be_is_at_it():
+    before = Press(35.0, 0.4, (Measured(0.0, 5.0, 1000, 0.9),))
+    recipe = with_limit(RECIPES[0], closing_mm=AT_MM)
+    assert Evidence(before, sized_limits(before, recipe)).reached_mm == AT_MM
+
+
+def test_the_growth_over_light_touches_is_as_uncertain_as_repeating_makes_them():
+    recipe, touches = RECIPES[0], Press(35.0, 0.4, tuple(Measured(c / 4, 4.0 * c, 1000 * c, 0.9) for c in range(1, 5)))
+    uncertainty = recipe.damage.uncertainty
+    doubled = tuple(each.model_copy(update={"relative": 2 * each.relative}) for each in uncertainty.repeatability)
+    damage = recipe.damage.model_copy(update={"uncertainty": uncertainty.model_copy(update={"repeatability": doubled})})
+    once = Evidence(touches, sized_limits(touches, recipe)).latest_growth
+    twice = Evidence(touches, sized_limits(touches, recipe.model_copy(update={"damage": damage}))).latest_growth
+    assert once is not None
+    assert twice is not None
+    assert twice.uncertainty_mm2_per_mm > once.uncertainty_mm2_per_mm
+
+
+def test_a_press_without_a_step_has_reached_nothing():
+    verdict = judge(Press(35.0, 0.4, ()), RECIPES[0])
+    first_mm = RECIPES[0].damage.area[0].closing_mm
+    assert [each.message for each in verdict.findings] == [messages.STEPS_ENDED(reached_mm=0.0, wanted_mm=first_mm)]
+    assert verdict.partial
+
+
 def test_the_smallest_and_the_largest_fruit_are_the_recipes():
     recipe = RECIPES[0]
     width = recipe.expected_width
@@ -102,6 +156,10 @@ def test_half_steps_make_a_window_of_two_millimetres():
     short, growth = Evidence(half, sized_limits(half, RECIPES[0])).growths
     assert (short.from_closing_mm, short.to_closing_mm, short.few) == (3.0, 4.5, True)
     assert (growth.from_closing_mm, growth.to_closing_mm, growth.few) == (3.0, 5.0, False)
+    uneven = Press(35.0, 0.4, tuple(Measured(c, 16.0 * c, 1000, 0.9) for c in (2.0, 3.0, 4.0, 4.5, 5.0)))
+    latest = Evidence(uneven, sized_limits(uneven, RECIPES[0])).latest_growth
+    assert latest is not None
+    assert latest.from_closing_mm == 3.0
 
 
 def test_steps_that_share_a_closing_have_the_doubts_of_each():

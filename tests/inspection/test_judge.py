@@ -299,6 +299,9 @@ def test_steps_that_end_for_no_reason_are_not_taken_for_a_pass():
     short = judge(pressed(20, to_mm=6), STRAWBERRY)
     assert (short.outcome, short.reasons) == ("NO_RESULT", (Reason.INTERNAL_FAULT,))
     assert short.findings[0].message == messages.STEPS_ENDED(reached_mm=6.0, wanted_mm=12.0)
+    a_step_short = judge(pressed(15, to_mm=11), STRAWBERRY)
+    assert STRAWBERRY.steps.step_mm == 1.0
+    assert (a_step_short.reasons, a_step_short.partial) == ((Reason.INTERNAL_FAULT,), True)
     missing = judge(pressed(20, to_mm=3, interruptions=(Reason.GRIPPER_FAULT,)), STRAWBERRY)
     assert missing.reasons == (Reason.GRIPPER_FAULT,), "what ended the steps is known: no fault of the program"
     assert missing.partial

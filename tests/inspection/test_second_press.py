@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from station.inspection.evidence import AT_MM
 from station.inspection.fruit_size import FruitSize
 from station.inspection.judge import judge
 from station.inspection.press import Measured, Press
@@ -151,6 +152,8 @@ class TestTogether:
         assert at_3_mm(together([press(), rounded])).area_mm2 == 28.0
         a_count_on = replace(later, points=tuple(replace(p, closing_mm=p.closing_mm + COUNT_MM) for p in later.points))
         assert at_3_mm(together([press(), a_count_on])).area_mm2 == 30.0
+        onset, just_past = (Press(14.0, 0.4, (Measured(c, 2.0 + c, 1000, 0.9),)) for c in (0.0, AT_MM))
+        assert together([just_past, onset]).points[0].area_mm2 == pytest.approx(2.0 + AT_MM / 2)
 
     def test_the_later_press_says_onset_faults_and_how_far_it_has_come(self):
         later = press(SOUND_MM2[:2], onset_mm=13.6, interruptions=(Reason.CAMERA_FAULT,))

@@ -12,7 +12,14 @@ from hypothesis import strategies as st
 from station.errors import BadInputError
 from station.messages import settings as messages
 from station.settings.problems import Problem, SettingsError
-from station.settings.recipe import Recipe, approved_by_distribution, find_recipe, load_recipe, load_recipes
+from station.settings.recipe import (
+    Recipe,
+    approved_by_distribution,
+    approved_list,
+    find_recipe,
+    load_recipe,
+    load_recipes,
+)
 from station.settings.recipe_versions import content_sha256
 from station.settings.validation import validated
 from station.settings.yaml_loader import parse_document
@@ -460,6 +467,11 @@ class TestFolders:
             load_recipes(tmp_path)
         assert [str(problem.place) for problem in caught.value.problems] == [f"{first}:16", f"{second}:1"]
 
+    def test_the_list_of_hashes_is_in_the_order_of_the_names(self, small, write, tmp_path):
+        write(small, "a.yaml")
+        write(small.replace("cherry", "apricot").replace("plc_number: 7", "plc_number: 9"), "b.yaml")
+        assert list(json.loads(approved_list(tmp_path))) == ["apricot", "cherry"]
+
     def test_other_files_are_left_alone(self, small, write, tmp_path):
         write(small)
         write("{}", "recipe.schema.json")
@@ -510,8 +522,12 @@ class TestFinding:
         write(small)
         broken = write("name: plum", "plum.yaml")
         assert find_recipe("cherry", tmp_path).name == "cherry"
-        with pytest.raises(BadInputError, match=re.escape(f"{broken}:1: schema_version: expected 1, got nothing")):
+        with pytest.raises(SettingsError) as its_own:
+            load_recipe(broken)
+        with pytest.raises(BadInputError) as caught:
             find_recipe("plum", tmp_path)
+        assert str(caught.value).splitlines()[1:] == str(its_own.value).splitlines()
+        assert f"{broken}:1: schema_version: expected 1, got nothing" in str(caught.value)
 
 
 VALUES = st.one_of(

@@ -32,6 +32,7 @@ def test_the_bit_may_follow_the_number_once(bench, again):
     made = shown(bench)
     made.write("enable", acknowledged_sequence=41)
     assert made.state.journal.acknowledged == 41
+    made.write("enable", plc_heartbeat=1)
     made.write("enable", "acknowledge")
     assert (made.state.result, made.state.faults) == (Result.TAKEN, ())
     made.write("enable")
@@ -39,14 +40,57 @@ def test_the_bit_may_follow_the_number_once(bench, again):
     assert made.state.faults == (Fault.WRONG_ACKNOWLEDGEMENT,)
 
 
-def test_a_bit_in_the_first_write_after_a_start_has_confirmed_its_number(bench):
+@pytest.mark.parametrize("again", [41, 1])
+def test_a_bit_with_the_number_confirms_it_once(bench, again):
+    made = shown(bench)
+    made.write("enable", "acknowledge", acknowledged_sequence=41)
+    made.write("enable")
+    made.write("enable", "acknowledge", acknowledged_sequence=again)
+    assert made.state.faults == (Fault.WRONG_ACKNOWLEDGEMENT,)
+
+
+@pytest.mark.parametrize("again", [41, 1])
+def test_a_bit_in_the_first_write_after_a_start_has_confirmed_its_number(bench, again):
     made = bench(Journal(queue=(shown(bench).state.queue[0],), highest=41))
     made.feed(ev.WriterGranted)
     made.write("enable", "acknowledge", acknowledged_sequence=41)
-    assert (made.state.queue, made.state.faults) == ((), ())
+    assert (made.state.queue, made.state.result, made.state.faults) == ((), Result.EMPTY, ())
     made.write("enable")
-    made.write("enable", "acknowledge")
+    made.write("enable", "acknowledge", acknowledged_sequence=again)
     assert made.state.faults == (Fault.WRONG_ACKNOWLEDGEMENT,)
+
+
+def test_a_bit_may_follow_the_number_of_the_first_write_after_a_start(bench):
+    made = bench(Journal(queue=(shown(bench).state.queue[0],), highest=41))
+    made.feed(ev.WriterGranted)
+    made.write("enable", acknowledged_sequence=41)
+    made.write("enable", "acknowledge")
+    assert (made.state.queue, made.state.result, made.state.faults) == ((), Result.TAKEN, ())
+
+
+def test_what_was_called_off_is_passed_over_by_the_first_write_after_a_start(bench):
+    made = bench(Journal(queue=(shown(bench).state.queue[0],), highest=41, hidden=(42,)))
+    made.link()
+    made.feed(ev.WriterGranted)
+    assert made.state.journal.hidden == (42,)
+    made.write("enable", acknowledged_sequence=41)
+    assert (made.state.journal.acknowledged, made.state.journal.hidden) == (42, ())
+
+
+def test_a_wrong_acknowledgement_of_what_was_taken_does_not_hide_an_early_one(bench):
+    before = shown(bench)
+    before.write("enable", "acknowledge", acknowledged_sequence=41)
+    before.write("enable")
+    before.write("enable", "trigger", trigger_id=8)
+    before.feed(ev.BeginAnswered, before.state.pending.number, BeginReply(sequence=42, deadline_s=2.0))
+    before.write("enable", acknowledged_sequence=42)
+    before.write("enable", "acknowledge", acknowledged_sequence=41)
+    outcome = before.outcome().model_copy(update={"sequence": 42, "trigger_id": 8})
+    before.feed(ev.OutcomeReceived, outcome)
+    made = bench(before.state.journal)
+    made.feed(ev.WriterGranted)
+    made.write("enable", acknowledged_sequence=42)
+    assert (made.state.result, made.state.published) == (Result.PUBLISHED, 42)
 
 
 @pytest.mark.parametrize("register", ["acknowledged_sequence", "control"])

@@ -66,6 +66,15 @@ def test_the_running_inspections_outcome_is_asked_for_again_after_a_lost_answer(
     assert made.state.inspection is Inspection.RUNNING
 
 
+def test_a_running_inspection_that_the_station_does_not_name_any_more_is_lost_to_it(bench):
+    made = bench()
+    made.run()
+    other = made.outcome().model_copy(update={"sequence": 40, "trigger_id": 6})
+    made.feed(ev.OutcomeFailed, 41, "no answer")
+    made.link(Open(running=None, outcomes=(other,)))
+    assert [(each.sequence, each.reasons) for each in made.state.queue] == [(41, (Reason.STATION_LOST,))]
+
+
 @pytest.mark.parametrize(("ran_s", "known_s"), [(0.5, 0.5), (-3.0, 0.0)])
 def test_an_inspection_that_ran_at_the_end_waits_for_the_station_as_long_as_it_may(bench, ran_s, known_s):
     before = bench()
