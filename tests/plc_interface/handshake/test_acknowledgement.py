@@ -49,11 +49,12 @@ def test_a_bit_with_the_number_confirms_it_once(bench, again):
     assert made.state.faults == (Fault.WRONG_ACKNOWLEDGEMENT,)
 
 
-@pytest.mark.parametrize("again", [41, 1])
-def test_a_bit_in_the_first_write_after_a_start_has_confirmed_its_number(bench, again):
-    made = bench(Journal(queue=(shown(bench).state.queue[0],), highest=41))
+@pytest.mark.parametrize(("sequence", "again"), [(41, 41), (41, 1), (1, 1)])
+def test_a_bit_in_the_first_write_after_a_start_has_confirmed_its_number(bench, sequence, again):
+    outcome = shown(bench).state.queue[0].model_copy(update={"sequence": sequence})
+    made = bench(Journal(queue=(outcome,), highest=41))
     made.feed(ev.WriterGranted)
-    made.write("enable", "acknowledge", acknowledged_sequence=41)
+    made.write("enable", "acknowledge", acknowledged_sequence=sequence)
     assert (made.state.queue, made.state.result, made.state.faults) == ((), Result.EMPTY, ())
     made.write("enable")
     made.write("enable", "acknowledge", acknowledged_sequence=again)
