@@ -1,5 +1,7 @@
 """Base classes of errors that a person can repair."""
 
+from typing import Self
+
 from station.messages.message import Message, verbatim
 
 
@@ -14,6 +16,14 @@ class StationError(Exception):
     def __init__(self, message: Message | str = "") -> None:
         super().__init__(str(message))
         self.message = verbatim(message) if isinstance(message, str) else message
+
+    def again(self) -> Self:
+        """Return this error, which was kept, to be raised once more.
+
+        Python adds to an error's traceback, with all that its functions held, each time it is raised: one that is kept
+        for as long as a device waits for a person would grow by megabytes an hour.
+        """
+        return self.with_traceback(None)
 
 
 class BadInputError(StationError):

@@ -334,7 +334,7 @@ class Records:
     def _get(self) -> Opened:
         opened = self._opened
         if opened is None:
-            raise self._why_closed
+            raise self._why_closed.again()
         return opened
 
     async def _ask(self, work: Work[T]) -> T:

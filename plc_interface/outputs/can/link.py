@@ -152,7 +152,7 @@ class CanLink:
             InterfaceError: the controller is bus-off, the interface fails, or the receiving thread has ended.
         """
         if self._failure:
-            raise self._failure
+            raise self._failure.again()
         if not self._thread.is_alive():
             raise InterfaceError(messages.DEAF(bus=described(self._settings)))
 

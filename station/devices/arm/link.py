@@ -105,7 +105,7 @@ class ArmLink:
                     self._changed.clear()
                     await self._changed.wait()
         if self.fault is not None:
-            raise self.fault
+            raise self.fault.again()
 
     async def snapshot(self) -> Snapshot:
         """Read the controller's state now; the request's duration is added to its age.
@@ -115,7 +115,7 @@ class ArmLink:
         """
         process = self._process
         if process is None:
-            raise self.fault or ArmFault(ArmCause.LINK_LOST, messages.NOT_CONNECTED())
+            raise (self.fault or ArmFault(ArmCause.LINK_LOST, messages.NOT_CONNECTED())).again()
         limit_s, begun_s = self._settings.stale_after_s, time.monotonic()
         try:
             snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=limit_s)
@@ -139,11 +139,11 @@ class ArmLink:
                 await self._lock.acquire()
         except TimeoutError as error:
             busy = ArmFault(ArmCause.BUSY, messages.LINK_BUSY(limit_s=limit_s, request=request.meaning))
-            raise self.fault or busy from error
+            raise (self.fault or busy).again() from error
         try:
             process = self._process
             if process is None:
-                raise self.fault or ArmFault(ArmCause.LINK_LOST, messages.NOT_CONNECTED())
+                raise (self.fault or ArmFault(ArmCause.LINK_LOST, messages.NOT_CONNECTED())).again()
             try:
                 return await self._ask_watched(process, request)
             except ArmFault as fault:
@@ -202,7 +202,7 @@ class ArmLink:
         if not snapshot.commanding:
             await self._command(process)
             if self.fault is not None:
-                raise self.fault
+                raise self.fault.again()
         elif snapshot.runtime_state != PLAYING:
             done = await process.request(Upload(), Outcome, deadline_s=self._settings.constructor_limit_s)
             if not done.done:

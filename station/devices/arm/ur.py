@@ -144,7 +144,7 @@ class UrArm:
         deadline_s = time.monotonic() + self._settings.call_deadline_s
         while time.monotonic() < deadline_s:
             if self._link.lost is not None:
-                raise self._link.lost
+                raise self._link.lost.again()
             snapshot = await self._fresh_enough()
             if snapshot is not None and not _moves(snapshot):
                 return
@@ -199,7 +199,7 @@ class UrArm:
 
     async def _require_ready(self) -> Snapshot:
         if self._link.fault is not None:
-            raise self._link.fault
+            raise self._link.fault.again()
         if not self._link.healthy:
             raise ArmFault(ArmCause.UNHEALTHY, messages.UNHEALTHY())
         snapshot = await self._link.snapshot()
@@ -252,7 +252,7 @@ class UrArm:
                 await self._brake()  # once more: the stop may have come just before the motion began
                 raise ArmFault(ArmCause.STOPPED, messages.MOTION_STOPPED(pose=where))
             if self._link.fault is not None:
-                raise self._link.fault
+                raise self._link.fault.again()
             snapshot = await self._fresh_enough()
             near = snapshot is not None and _near(snapshot.joints_rad, target, tolerance_rad)
             if snapshot is None or _moves(snapshot):

@@ -268,7 +268,7 @@ class Service:
             return Event.STOP
         for fault in (*self._devices.faults.values(), self.registry.fault):
             if fault is not None:
-                raise fault
+                raise fault.again()
         return Event.READY
 
     async def _recover_arm(self) -> Event:

@@ -243,7 +243,7 @@ class DeviceManager:
             raise refusal
         state = await self._arm.state()
         if state.fault is not None:
-            raise state.fault
+            raise state.fault.again()
         if state.at == "nest" and are_open(width_mm, self.cell.gripper.max_width_mm):
             await self._arm.move_to("above_nest")
         elif state.at not in {"home", "above_nest"}:
@@ -265,11 +265,12 @@ class DeviceManager:
         reading = await self.cell.gripper.read()
         self._gripper_reading = reading
         if reading.fault_code in NEEDS_ACTIVATION or reading.fault_code == _OVER_TEMPERATURE:
-            raise self._not_activated or GripperFaultError(reading.fault_code)
-        if not reading.active:
-            raise self._not_activated or GripperNotActiveError(
-                gripper_messages.NOT_ACTIVE(), gripper_messages.REMEDY_WAIT()
-            )
+            fault = GripperFaultError(reading.fault_code)
+        elif not reading.active:
+            fault = GripperNotActiveError(gripper_messages.NOT_ACTIVE(), gripper_messages.REMEDY_WAIT())
+        else:
+            return
+        raise (self._not_activated or fault).again()
 
     async def _check_arm(self) -> None:
         assert self._arm is not None  # noqa: S101 (the watch exists only with an arm)
@@ -278,7 +279,7 @@ class DeviceManager:
         stale = fault is not None and fault.cause is ArmCause.STALE
         self._stale_checks = self._stale_checks + 1 if stale else 0
         if fault is not None and not 0 < self._stale_checks < _STALE_CHECKS:
-            raise fault
+            raise fault.again()
 
 
 def _is_stop(fault: StationError) -> bool:

@@ -1,6 +1,7 @@
 """What a site may choose: fruit placed by the arm, no reset by itself; and a disk that refuses in mid inspection."""
 
 import asyncio
+import traceback
 import resource
 
 import pytest
@@ -102,6 +103,12 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
             await cell.until(lambda: AlarmId.ARM_NOT_REMOTE in active(cell))
             fault = ArmFault(ArmCause.REGISTERS_IN_USE, arm_messages.REGISTERS_IN_USE())
             assert cell.station.service.alarms.alarms.get(AlarmId.ARM_NOT_REMOTE).detail == fault.message
+            depths = []
+            for _ in range(5):  # as often as it is checked while it waits for a person, all night perhaps
+                with pytest.raises(ArmFault) as caught:
+                    await crew._check_arm()
+                depths.append(len(list(traceback.walk_tb(caught.value.__traceback__))))
+            assert depths == 5 * depths[:1]
             faults.clear()
             done = await line.client.request(Recover(what="program"), CommandDone, deadline_s=60)
             assert done.done, done.why
