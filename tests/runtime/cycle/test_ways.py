@@ -1,8 +1,8 @@
 """What a site may choose: fruit placed by the arm, no reset by itself; and a disk that refuses in mid inspection."""
 
 import asyncio
-import traceback
 import resource
+import traceback
 
 import pytest
 
