@@ -6,13 +6,10 @@ Run with `./run bench sizing [FRUITS]`. Writes the table of `docs/sizing.md`.
 import asyncio
 import os
 import shutil
-import socket
 import sqlite3
 import statistics
-import struct
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Awaitable
 from contextlib import closing
@@ -20,6 +17,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import psutil
+from bench_plc import built
+from bench_soak import WINDOW_S, latency
+from soak.samples import Latency
 
 from plc_interface.plc_simulator.nest import TwinNest
 from plc_interface.plc_simulator.program import LineProgram
@@ -32,7 +32,7 @@ from station.settings.recipe import load_recipes
 from station.supervision.programs import station_programs, twin_program
 from station.supervision.supervisor import Supervisor
 
-IDLE_S, POLL_S, SEED, HOURS = 20.0, 0.01, 2026, 16
+IDLE_S, SEED, HOURS = 20.0, 2026, 16
 KINDS = ("strawberry", "raspberry", "blueberry")
 CONSOLE_PORT, HOST = 49_341, "127.0.0.87"
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "sizing.md"
@@ -62,29 +62,7 @@ class Phase(NamedTuple):
     wall_s: float
     cpu_s: dict[str, float]
     resident_mb: dict[str, float]
-    replies_ms: list[float]
-
-
-class Poller(threading.Thread):
-    """A PLC that reads four registers every 10 ms, and how long each reply took."""
-
-    def __init__(self, site: Configuration) -> None:
-        super().__init__(daemon=True)
-        self._address = (site.modbus.host, site.modbus.port)
-        self.replies_ms: list[float] = []
-        self.ended = threading.Event()
-
-    def run(self) -> None:
-        """Poll until ended."""
-        with socket.create_connection(self._address, timeout=5) as connection:
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            number = 0
-            while not self.ended.wait(POLL_S):
-                number = (number + 1) % 65536
-                began = time.perf_counter()
-                connection.sendall(struct.pack(">HHHBBHH", number, 0, 6, 1, 3, 0, 4))
-                connection.recv(64)
-                self.replies_ms.append(1000 * (time.perf_counter() - began))
+    replies: list[Latency]
 
 
 def children() -> dict[str, psutil.Process]:
@@ -115,21 +93,26 @@ def pin() -> None:
             each.cpu_affinity(cores[-1:] if name == "plc" else cores[:-1] or cores)
 
 
-async def phase(site: Configuration, work: Awaitable[object]) -> Phase:
-    """Measure while something is done."""
-    poller, before, began_s = Poller(site), use(), time.monotonic()
-    poller.start()
+async def phase(site: Configuration, load: Path, work: Awaitable[object]) -> Phase:
+    """Measure while something is done; `load` is the client that asks for the PLC's replies."""
+    ended, replies = asyncio.Event(), list[Latency]()
+
+    async def ask() -> None:
+        while not ended.is_set():
+            if (found := await latency(load, site.modbus.port, ended)) is not None:
+                replies.append(found)
+
+    before, began_s = use(), time.monotonic()
+    asking = asyncio.create_task(ask())
     await work
-    poller.ended.set()
-    await asyncio.to_thread(poller.join)
+    ended.set()
+    await asking
     after = use()
     cpu_s = {name: after[name].cpu_s - before[name].cpu_s for name in before}
-    return Phase(
-        time.monotonic() - began_s, cpu_s, {name: each.resident_mb for name, each in after.items()}, poller.replies_ms
-    )
+    return Phase(time.monotonic() - began_s, cpu_s, {name: each.resident_mb for name, each in after.items()}, replies)
 
 
-async def measure(site: Configuration, count: int) -> dict[str, Phase]:
+async def measure(site: Configuration, load: Path, count: int) -> dict[str, Phase]:
     """Idle, inspecting, and inspecting pinned."""
     numbers = {name: recipe.plc_number for name, recipe in load_recipes(site.recipes_folder).items()}
     nest = TwinNest(CONSOLE_PORT, {kind: numbers[kind] for kind in KINDS}, 0.25, SEED)
@@ -142,14 +125,14 @@ async def measure(site: Configuration, count: int) -> dict[str, Phase]:
     try:
         async with asyncio.timeout(180):
             await ready.wait()
-        phases["idle"] = await phase(site, asyncio.create_task(asyncio.sleep(IDLE_S)))
+        phases["idle"] = await phase(site, load, asyncio.create_task(asyncio.sleep(IDLE_S)))
         for name in ("inspecting", "pinned"):
             if name == "pinned":
                 pin()
             order = WordOrder(site.modbus.word_order)
             async with Scanner(site.modbus.host, site.modbus.port, site.modbus.unit, order) as scanner:
                 simulator = LineSimulator(LineProgram(lot="BENCH"), scanner, nest, Pace())
-                phases[name] = await phase(site, asyncio.create_task(simulator.run(count)))
+                phases[name] = await phase(site, load, asyncio.create_task(simulator.run(count)))
             print(name, "done", file=sys.stderr)
     finally:
         ended.set()
@@ -177,8 +160,8 @@ def written(phases: dict[str, Phase], sizes: tuple[float, float, float], count: 
     seconds = busy.wall_s / count
     parts = [
         f"{count} fruits on the twin, one after the other ({seconds:.1f} s each), and as many again with the PLC",
-        f" interface alone on one core; {os.cpu_count()} cores, load {os.getloadavg()[1]:.1f}. A client reads four",
-        " registers every 10 ms meanwhile. Shares are of one core.\n\n",
+        f" interface alone on one core; {os.cpu_count()} cores, load {os.getloadavg()[1]:.1f}. A client in C",
+        " reads registers every 10 ms meanwhile. Shares are of one core.\n\n",
         _head("process", "idle", "inspecting", "CPU a fruit, s", "memory, MB"),
     ]
     for words, names in (*rows, ("the station", tuple(ours))):
@@ -186,11 +169,14 @@ def written(phases: dict[str, Phase], sizes: tuple[float, float, float], count: 
         memory_mb = sum(busy.resident_mb[name] for name in names)
         shares = f"{idle_s / idle.wall_s:.2f} | {busy_s / busy.wall_s:.2f}"
         parts.append(f"| {words} | {shares} | {busy_s / count:.2f} | {memory_mb:.0f} |\n")
-    parts.append("\n" + _head("the PLC's replies", "median, ms", "99 %, ms", "longest, ms", "of"))
+    parts.append(
+        "\n" + _head("the PLC's replies", "median, ms", "99 %, ms", "longest, ms", f"windows of {WINDOW_S:g} s")
+    )
     for name, words in (("idle", "idle"), ("inspecting", "inspecting"), ("pinned", "inspecting, pinned")):
-        replies = sorted(phases[name].replies_ms)
-        tail = f"{replies[int(0.99 * len(replies))]:.2f} | {replies[-1]:.1f}"
-        parts.append(f"| {words} | {statistics.median(replies):.2f} | {tail} | {len(replies)} |\n")
+        replies = phases[name].replies
+        middle, tail = (statistics.median(values) / 1e3 for values in list(zip(*replies, strict=True))[:2])
+        longest = max(each.worst_us for each in replies) / 1e3
+        parts.append(f"| {words} | {middle:.2f} | {tail:.2f} | {longest:.1f} | {len(replies)} |\n")
     parts.append("\n" + _head("on the disk", ""))
     parts.append(f"| a fruit's record | {sizes[0]:.1f} kB |\n")
     parts.append(f"| a fruit's images, where they are stored | {sizes[1] / 1e3:.1f} MB |\n")
@@ -216,7 +202,7 @@ def main() -> None:
     try:
         site = load_configuration()
         calibrate_simulated_unit(site, "bench")
-        phases = asyncio.run(measure(site, count))
+        phases = asyncio.run(measure(site, built("load", home), count))
         text = written(phases, disk(home, 2 * count), count)
     finally:
         shutil.rmtree(home)
