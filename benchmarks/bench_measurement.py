@@ -13,7 +13,7 @@ import sys
 import time
 import tracemalloc
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -29,6 +29,7 @@ from measurement.peers import methods
 from measurement.references import compressed, reference_table
 from measurement.soft_table import soft_table
 from measurement.untouched import untouched_table
+from sections import write
 
 from station.settings.segmentation import RobustParameters
 from station.vision.contact import Contact, Image, Mask
@@ -286,6 +287,11 @@ def spread(values: Floats) -> str:
     return f"{np.median(values):.2f}, {np.percentile(values, 10):.2f} to {np.percentile(values, 90):.2f}"
 
 
+def shown(table: Sequence[str]) -> list[str]:
+    """Of a table what the README shows: the paper's method and this one."""
+    return [*table[:2], *(row for row in table if row.startswith(("| `paper`", "| `robust`")))]
+
+
 def main() -> None:
     """Measure everything in two processes of one thread each, and write the document."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -391,6 +397,7 @@ def main() -> None:
     ]
     print("\n".join(lines))
     (ROOT / "docs" / "measurement.md").write_text("\n".join(lines))
+    write(ROOT / "README.md", {name: shown(tables[name]) for name in ("presses", "no_contact")})
 
 
 if __name__ == "__main__":

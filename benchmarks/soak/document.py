@@ -38,7 +38,7 @@ The service grew by 27 MB an hour (24 to 29 at 95%) in a run of 53 minutes on 20
 process left a cancelled wait for that process's end behind, which Python 3.11 keeps until the process has ended. All
 requests share one wait now (`tests/devices/arm/test_process_messages.py`). A bench, which has no arm, never had it.
 
-Looked at from inside meanwhile, a station whose arm waited for a person grew too, at each check: the fault, one kept
+Seen from inside meanwhile, a station whose arm waited for a person grew too, at each check: the fault, one kept
 error, was raised again, and Python adds to an error's traceback each time. It is raised without it now
 (`tests/test_errors.py`)."""
 """Written by hand: the stories behind a figure that was wrong once."""
