@@ -16,6 +16,7 @@ from station.twin.digit.spoil import FRAME_FAULTS, spoiled
 from station.twin.digit.wire import packed, read_request
 from station.twin.faults import CommonFault, FaultBoard
 from station.twin.gel import SENSOR_SHAPE
+from station.twin.ports import stop_listening
 from station.twin.world import Touch, World
 
 FRAMES_PER_S = 30.0
@@ -116,7 +117,7 @@ class DigitCameraServer:
         if self._server is None or self._drawing is None:
             return
         server, self._server = self._server, None
-        server.close()
+        await stop_listening(server)
         tasks = [self._drawing, *self._clients]
         for task in tasks:
             task.cancel()

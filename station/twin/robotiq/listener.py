@@ -5,6 +5,7 @@ from abc import ABC, abstractmethod
 from contextlib import suppress
 
 from station.twin.faults import CommonFault, FaultBoard
+from station.twin.ports import stop_listening
 from station.twin.robotiq.model import RobotiqGripper
 
 GARBAGE = bytes.fromhex("ff00a55a0df3c3e1fe0a")
@@ -69,8 +70,8 @@ class Listener(ABC):
 
     async def _close(self) -> None:
         if self._server:
-            self._server.close()
-            self._server = None
+            server, self._server = self._server, None
+            await stop_listening(server)
         sessions = list(self._sessions.items())
         for task, writer in sessions:
             writer.transport.abort()

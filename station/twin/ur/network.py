@@ -5,6 +5,7 @@ import contextlib
 from typing import TYPE_CHECKING
 
 from station.twin.faults import CommonFault
+from station.twin.ports import stop_listening
 from station.twin.ur import dashboard, primary, rtde
 
 if TYPE_CHECKING:  # the controller makes these itself
@@ -53,7 +54,7 @@ class Network:
         """Refuse and cut every connection; closing twice does nothing."""
         servers, self._servers = self._servers, []
         for server in servers:
-            server.close()
+            await stop_listening(server)
         streams = list(self._streams)
         for stream in streams:
             stream.cancel()

@@ -1,0 +1,94 @@
+"""A device of the twin that is gone answers nobody, also not a client whom it was just letting in."""
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from station.twin.clock import SteadyClock
+from station.twin.digit.sensor import DigitSensor
+from station.twin.digit.server import DigitCameraServer, digit_faults
+from station.twin.digit.wire import packed
+from station.twin.robotiq.faults import gripper_faults
+from station.twin.robotiq.model import RobotiqGripper
+from station.twin.robotiq.urcap import UrcapServer
+from station.twin.ur import dashboard, primary, rtde
+from station.twin.ur.controller import UrController, arm_faults
+from station.twin.world import World
+from tests.hosts import fresh_host
+
+TURNS_UNTIL_SERVED = 8
+"""Turns of asyncio's loop in which a client that connected is served for certain, while its port is open."""
+
+
+def gripper(host: str) -> UrcapServer:
+    return UrcapServer(RobotiqGripper(SteadyClock(), gripper_faults()), host=host, port=0)
+
+
+def camera(host: str) -> DigitCameraServer:
+    return DigitCameraServer(World(SteadyClock()), DigitSensor(1), SteadyClock(), digit_faults(), host=host)
+
+
+def arm(host: str) -> UrController:
+    return UrController(host, SteadyClock(), arm_faults())
+
+
+@dataclass(frozen=True)
+class Port:
+    """A port of a device, and what it says to a client: by itself, and when asked."""
+
+    device: Callable[[str], Any]
+    number: Callable[[Any], int]
+    request: bytes
+    said: bytes
+
+
+PORTS = {
+    "gripper": Port(gripper, lambda server: server.port, b"GET STA\n", b"STA 0"),
+    "camera": Port(camera, lambda server: server.port, packed("leds", red=1, green=1, blue=1), b"leds"),
+    "dashboard": Port(arm, lambda _: dashboard.PORT, b"robotmode\n", b"Robotmode"),
+    "primary": Port(arm, lambda _: primary.PORT, b"", b"UR"),
+    "rtde": Port(arm, lambda _: rtde.PORT, bytes((0, 5, 86, 0, 2)), bytes((0, 4, 86, 1))),
+}
+
+
+async def heard(client: socket.socket, request: bytes) -> bytes:
+    """What a client hears until its connection ends, or nothing more comes."""
+    answer = b""
+    with contextlib.suppress(OSError, TimeoutError):
+        client.send(request)
+        async with asyncio.timeout(0.3):
+            while part := await asyncio.get_running_loop().sock_recv(client, 4096):
+                answer += part
+    return answer
+
+
+@pytest.mark.parametrize("turns", [*range(TURNS_UNTIL_SERVED), None])
+@pytest.mark.parametrize("port", PORTS.values(), ids=PORTS.keys())
+def test_nobody_is_served_after_a_port_was_closed(port: Port, turns: int | None):
+    """`turns` after a client has connected; without a number it stays open, and the same request has its answer."""
+    host = fresh_host()
+
+    async def scenario() -> bytes:
+        device = port.device(host)
+        await device.start()
+        try:
+            with socket.create_connection((host, port.number(device))) as client:
+                client.setblocking(False)
+                if turns is None:
+                    return await heard(client, port.request)
+                for _ in range(turns):
+                    await asyncio.sleep(0)
+                await device.stop()
+                with contextlib.suppress(OSError):
+                    client.recv(4096)
+                return await heard(client, port.request)
+        finally:
+            await device.stop()
+
+    answer = asyncio.run(scenario())
+    assert port.said in answer if turns is None else answer == b""
