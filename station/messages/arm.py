@@ -1,6 +1,6 @@
 """Messages of the arm: causes and remedies of its faults, its requests and its poses."""
 
-from station.messages.message import Nested, Number, define, define_plural
+from station.messages.message import Nested, Number, define
 
 FAULT = define("arm.fault", "arm: {cause}. {remedy}", cause=Nested(), remedy=Nested())
 
@@ -55,10 +55,6 @@ REMEDY_NOT_REACHED = define(
 REMEDY_STOPPED = define("arm.remedy_stopped", "Nothing to do: the station stopped the motion itself")
 REMEDY_BUSY = define("arm.remedy_busy", "Wait for the motion that is under way, or stop it")
 REMEDY_UNHEALTHY = define("arm.remedy_unhealthy", "Remove what keeps the station from being healthy")
-REMEDY_RESTARTS = define(
-    "arm.remedy_restarts",
-    "Read in the station's log why the arm's process keeps ending, then upload the program again",
-)
 REMEDY_CLOSED = define("arm.remedy_closed", "Open the arm again")
 
 EMERGENCY_STOP = define("arm.emergency_stop", "an emergency stop is active")
@@ -108,12 +104,6 @@ PROCESS_ENDED_AFTER = define(
     "arm.process_ended_after",
     "the arm's process ended with code {code}; its last output: {output}",
     code=Number(),
-)
-PROCESS_RESTARTS = define_plural(
-    "arm.process_restarts",
-    "the arm's process ended {times} time in {window_s} s",
-    "the arm's process ended {times} times in {window_s} s",
-    "times",
 )
 
 DASHBOARD_SILENT = define("arm.dashboard_silent", "the dashboard server at {host} does not answer")

@@ -261,21 +261,6 @@ class ArmSettings(Settings):
         ge=0.5,
         le=50.0,
     )
-    restart_budget: int = setting(
-        5,
-        title="Restart budget",
-        description="So many starts of the driver's process within the window are tried; then a person is asked for.",
-        ge=1,
-        le=100,
-    )
-    restart_window_s: float = setting(
-        60.0,
-        title="Restart window",
-        description="The time over which restarts are counted.",
-        unit="s",
-        ge=1.0,
-        le=3600.0,
-    )
 
     @model_validator(mode="after")
     def _stops_before_the_watchdog(self) -> Self:

@@ -15,6 +15,8 @@ class Move(NamedTuple):
 
 
 MOVES = (Move(("service", "channel"), ("handshake", "endpoint")),)
+WITHOUT_EFFECT = (("arm", "restart_budget"), ("arm", "restart_window_s"))
+"""Settings that are gone: nothing takes their place."""
 
 
 class Migrated(NamedTuple):
@@ -27,7 +29,9 @@ class Migrated(NamedTuple):
 
 
 def migrated(content: bytes, source: str) -> Migrated:
-    """Move the settings of an earlier version to their new places; the values are not validated. Idempotent.
+    """Move the settings of an earlier version to their new places, and remove those that are gone. Idempotent.
+
+    The values are not validated.
 
     Raises:
         SettingsError: it is no YAML mapping, or a setting is in its old and in its new place.
@@ -36,7 +40,8 @@ def migrated(content: bytes, source: str) -> Migrated:
     values = commented.values
     if not isinstance(values, dict | None):
         raise SettingsError([Problem(messages.PATH(path=source), messages.FILE(), messages.NO_NAMES())])
-    changes = tuple(_moved(values, move, source) for move in MOVES if _section(values, move.old) is not None)
+    moved = (_moved(values, move, source) for move in MOVES if _section(values, move.old) is not None)
+    changes = (*moved, *(_removed(values, path) for path in WITHOUT_EFFECT if _section(values, path) is not None))
     return Migrated(commented.written() if changes else "", changes)
 
 
@@ -54,9 +59,8 @@ def _moved(values: Any, move: Move, source: str) -> str:
         raise SettingsError([Problem(place, field, messages.MOVED_TWICE(new=new))])
     section = _section(values, move.old)
     assert section is not None  # noqa: S101 (the caller has looked)
-    value = section.pop(move.old[-1])
-    if not section:
-        _drop(values, move.old[:-1])
+    value = section[move.old[-1]]
+    _drop(values, move.old)
     place = values
     for part in move.new[:-1]:
         if not isinstance(place.get(part), dict):
@@ -66,10 +70,15 @@ def _moved(values: Any, move: Move, source: str) -> str:
     return f"{old} is {new} now"
 
 
+def _removed(values: Any, path: tuple[str, ...]) -> str:
+    _drop(values, path)
+    return f"{dotted(path)} is gone, as it has no effect any more"
+
+
 def _drop(values: dict[str, Any], path: tuple[str, ...]) -> None:
-    """Remove empty sections: `service:` alone would be a null."""
+    """Remove a setting, and sections that become empty: `service:` alone would be a null."""
     for depth in range(len(path), 0, -1):
         section = _section(values, path[:depth])
-        if section is None or section[path[depth - 1]]:
+        if section is None or (depth < len(path) and section[path[depth - 1]]):
             return
         del section[path[depth - 1]]

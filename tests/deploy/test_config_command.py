@@ -44,6 +44,22 @@ def test_an_earlier_file_is_brought_up_to_date_once_and_keeps_its_comments(file)
 
 
 @pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("arm:\n  restart_budget: 9\n  host: 10.0.0.2  # the cell's\n", "arm:\n  host: 10.0.0.2  # the cell's\n"),
+        ("hmi:\n  port: 8443\narm:\n  restart_budget: 9\n  restart_window_s: 30\n", "hmi:\n  port: 8443\n"),
+    ],
+)
+def test_a_setting_that_is_gone_is_removed(file, before, after):
+    file.write_text(before)
+    assert isinstance(config("check", "--config", file).exception, SettingsError)
+    said = config("migrate", "--write", file).output
+    assert said.startswith(f"{file}: arm.restart_budget is gone, as it has no effect any more\n")
+    assert file.read_text() == after
+    assert config("check", "--config", file).exit_code == 0
+
+
+@pytest.mark.parametrize(
     ("text", "words"),
     [
         (
@@ -78,3 +94,4 @@ def test_every_move_leads_to_a_setting_of_this_program_and_from_none():
     for move in migration.MOVES:
         assert move.new in fields
         assert move.old not in fields
+    assert not fields.intersection(migration.WITHOUT_EFFECT)

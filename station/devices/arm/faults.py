@@ -27,7 +27,6 @@ class ArmCause(StrEnum):
     STOPPED = "stopped"
     BUSY = "busy"
     UNHEALTHY = "unhealthy"
-    RESTARTS = "restarts"
     CLOSED = "closed"
 
 
@@ -49,7 +48,6 @@ REMEDIES: dict[ArmCause, Message] = {
     ArmCause.STOPPED: messages.REMEDY_STOPPED(),
     ArmCause.BUSY: messages.REMEDY_BUSY(),
     ArmCause.UNHEALTHY: messages.REMEDY_UNHEALTHY(),
-    ArmCause.RESTARTS: messages.REMEDY_RESTARTS(),
     ArmCause.CLOSED: messages.REMEDY_CLOSED(),
 }
 

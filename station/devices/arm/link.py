@@ -1,14 +1,14 @@
 """Arm link: starts, monitors and restarts the ur-rtde process of one controller.
 
-The link reconnects by itself after a drop. A fault that a person has to check remains until that person's command: a
-stop of any kind, a program that no longer plays, an exhausted restart budget.
+The link reconnects by itself after a drop, however often: ur-rtde's process ends with a dropped link, so its ends say
+nothing of their cause. A fault that a person has to check remains until that person's command: a stop of any kind, a
+program that no longer plays.
 """
 
 import asyncio
 import contextlib
 import logging
 import time
-from collections import deque
 from typing import NoReturn
 
 from station.devices.arm.dashboard import dashboard
@@ -40,7 +40,6 @@ class ArmLink:
         self._process: ArmProcess | None = None
         self._lost: ArmFault | None = None
         self._latched: ArmFault | None = ArmFault(ArmCause.CLOSED, messages.NOT_OPENED())
-        self._starts_s: deque[float] = deque()
         self._failures = 0
         self._healthy_until_s = 0.0
         self._was_healthy = True
@@ -181,7 +180,6 @@ class ArmLink:
             ArmFault: it does not play.
         """
         async with self._lock:
-            self._starts_s.clear()
             self._was_healthy = self.healthy
             for attempt in range(UPLOAD_TRIES):
                 try:
@@ -243,7 +241,7 @@ class ArmLink:
     async def _step(self) -> None:
         if self._process is not None:
             await self._watch(self._process)
-        elif self._latched is None or self._latched.cause is not ArmCause.RESTARTS:
+        else:
             process = await self._connect()
             snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
             fault = from_state(snapshot) or self._latched
@@ -271,16 +269,7 @@ class ArmLink:
 
     async def _connect(self) -> ArmProcess:
         async with dashboard(self._settings.host):
-            pass  # check that a controller answers before a start is spent on it
-        now_s = time.monotonic()
-        while self._starts_s and now_s - self._starts_s[0] > self._settings.restart_window_s:
-            self._starts_s.popleft()
-        if len(self._starts_s) >= self._settings.restart_budget:
-            raise ArmFault(
-                ArmCause.RESTARTS,
-                messages.PROCESS_RESTARTS(times=len(self._starts_s), window_s=self._settings.restart_window_s),
-            )
-        self._starts_s.append(now_s)
+            pass  # check that a controller answers before a process is started for it
         self._process = await ArmProcess.spawn(self._settings.host, self._settings.frequency_hz)
         outcome = await self._process.request(Watch(), Outcome, deadline_s=self._settings.constructor_limit_s)
         if not outcome.done:
