@@ -30,3 +30,31 @@ def faults(how: str) -> int:
 
 def test_what_was_freed_is_used_again():
     assert faults("kept") < 0.2 * faults("as it is")
+
+HEAPS = """
+import ctypes, sys, threading
+import numpy as np
+from station.memory import keep_freed_memory
+if sys.argv[1] == "kept":
+    keep_freed_memory()
+def draw():
+    np.ones((480, 640, 3), np.float32)
+for _ in range(4):
+    thread = threading.Thread(target=draw)
+    thread.start()
+    thread.join()
+libc = ctypes.CDLL(None)
+libc.fdopen.restype = ctypes.c_void_p
+libc.malloc_info(0, ctypes.c_void_p(libc.fdopen(1, b"w")))
+libc.fflush(None)
+"""
+
+
+def heaps(how: str) -> int:
+    command = [sys.executable, "-c", HEAPS, how]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout.count("<heap ")
+
+
+def test_the_threads_share_what_was_freed():
+    assert heaps("as it is") > 1
+    assert heaps("kept") == 1

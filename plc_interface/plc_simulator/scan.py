@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Self
 
 from pymodbus.client import AsyncModbusTcpClient
-from pymodbus.exceptions import ModbusException
+from pymodbus.exceptions import ConnectionException, ModbusException, ModbusIOException
 
 from plc_interface.registers.codec import RegisterValueError, WordOrder, decode, encode
 from plc_interface.registers.map import CONTROL, GROUP_BY_NAME, MORE_STATUS, RESULT, STATUS
@@ -14,6 +14,8 @@ from plc_interface.registers.register import Register
 
 ANSWER_LIMIT_S = 1.0
 logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # `trouble` holds its errors
+_WITHOUT_ANSWER = (ConnectionException, ModbusIOException, TimeoutError, OSError)
+"""Of a connection that a PLC's block would close: pymodbus holds some for connected that the peer has long reset."""
 _READ = (*STATUS, *RESULT, *MORE_STATUS)
 _FIRST = GROUP_BY_NAME["status"].address
 
@@ -56,6 +58,8 @@ class Scanner:
             values = {register.name: self._value(register, words) for register in _READ}
         except (ModbusException, RegisterValueError, TimeoutError, OSError) as error:
             self.trouble = f"{self._address[0]}:{self._address[1]}: {error}"
+            if isinstance(error, _WITHOUT_ANSWER):
+                self.cut()
             return None
         self.trouble = ""
         return values

@@ -28,6 +28,9 @@ RECONNECT_MS = 10
 _PING_MS, _PONG_MS = 1000, 5000
 """A connection whose server answers no ping within this time is made anew: where a length was spoilt on its way, the
 other side waits for bytes that never come. ZeroMQ answers by a thread of its own, also while a server works."""
+_GREETING_MS = 2000
+"""A connection whose greeting is not answered within this time is made anew; pings begin after it only. By itself
+ZeroMQ waits for 30 s."""
 _RETRY_SHOWN_S = 0.5
 """ZeroMQ announces within this time after a disconnection that it tries again; after a protocol error it never does."""
 
@@ -51,6 +54,7 @@ class ChannelClient:
         self._socket.setsockopt(zmq.LINGER, 0)
         self._socket.setsockopt(zmq.RECONNECT_IVL, RECONNECT_MS)
         self._socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_MESSAGE_BYTES)
+        self._socket.setsockopt(zmq.HANDSHAKE_IVL, _GREETING_MS)
         self._socket.setsockopt(zmq.HEARTBEAT_IVL, _PING_MS)
         self._socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, _PONG_MS)
         self._endpoint = check_endpoint(endpoint)

@@ -1,10 +1,13 @@
-"""The scan loop's own part: an end that is asked for is not lost."""
+"""The scan loop's own part: an end that is asked for is not lost, and a lost connection is made anew."""
 
 import asyncio
+import socket
+import struct
 
 import pytest
 from pymodbus.exceptions import ModbusException
 
+from plc_interface.plc_simulator.program import LineProgram
 from plc_interface.plc_simulator.scan import Scanner
 from plc_interface.registers.codec import WordOrder
 
@@ -32,3 +35,40 @@ def test_a_cancellation_that_the_library_loses_ends_the_exchange_all_the_same(mo
             await exchange
 
     asyncio.run(scenario())
+
+
+def test_after_a_connection_that_was_taken_and_reset_the_next_exchange_is_on_another(serve, unused_port):
+    """As a switch does it that restarts: pymodbus takes such a connection for a live one, and waits on it."""
+
+    async def scenario():
+        async with serve() as rig, Scanner("127.0.0.1", unused_port, 1, WordOrder.HIGH_FIRST) as scanner:
+            outputs = LineProgram().scan(None, 0.0, fruit_in_nest=False)
+            with socket.create_server(("127.0.0.1", unused_port)) as listening:
+                listening.settimeout(0)
+                exchange = asyncio.create_task(scanner.exchange(outputs))
+                taken, _ = await asyncio.get_running_loop().sock_accept(listening)
+                taken.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                taken.close()
+                assert await exchange is None
+            relaying = await asyncio.start_server(to(rig.port), "127.0.0.1", unused_port)
+            async with relaying:
+                values = await scanner.exchange(outputs)
+            assert values is not None, scanner.trouble
+            assert not scanner.trouble
+
+    asyncio.run(scenario())
+
+
+def to(port):
+    """Carry connections to another port."""
+
+    async def carry(reader, writer):
+        while data := await reader.read(4096):
+            writer.write(data)
+        writer.close()
+
+    async def relay(reader, writer):
+        far_reader, far_writer = await asyncio.open_connection("127.0.0.1", port)
+        await asyncio.gather(carry(reader, far_writer), carry(far_reader, writer))
+
+    return relay
