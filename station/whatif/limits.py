@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
 
 from station.inspection.evidence import Evidence
 from station.inspection.judge import early_stop, judge
@@ -182,9 +181,11 @@ def rate_interval(happened: int, number: int) -> Interval:
     """Return the confidence interval of the rate of cases in trials (Clopper and Pearson, Biometrika 26 (1934) 404)."""
     if not number:
         return Interval(None, None)
+    from scipy.special import betaincinv  # noqa: PLC0415 (it takes long to load, and each start of the pages waits)
+
     beyond, not_happened = (1 - CONFIDENCE) / 2, number - happened
-    low = special.betaincinv(happened, not_happened + 1, beyond) if happened else 0.0
-    high = special.betaincinv(happened + 1, not_happened, 1 - beyond) if not_happened else 1.0
+    low = betaincinv(happened, not_happened + 1, beyond) if happened else 0.0
+    high = betaincinv(happened + 1, not_happened, 1 - beyond) if not_happened else 1.0
     return Interval(float(low), float(high))
 
 

@@ -199,7 +199,7 @@ def test_little_space_on_the_disk_is_told_before_it_is_too_little(bench, until, 
 
 
 @pytest.mark.timeout(240)
-def test_many_fruit_that_cannot_be_judged_and_many_that_fail_are_alarms(bench, until):
+def test_many_fruit_that_cannot_be_judged_are_an_alarm_until_one_can(bench):
     async def scenario():
         async with bench() as cell:
             await cell.choose("raspberry")
@@ -209,10 +209,7 @@ def test_many_fruit_that_cannot_be_judged_and_many_that_fail_are_alarms(bench, u
                 assert (await cell.line.inspect()).outcome == "NO_RESULT"
             assert AlarmId.MANY_NO_RESULT in active(cell)
             cell.lay("raspberry", 1, bruised=True)
-            for number in range(11):
-                assert AlarmId.REJECT_RATE not in active(cell)
-                assert (await cell.line.inspect()).outcome == "FAIL", number
-            assert AlarmId.REJECT_RATE in active(cell)
+            assert (await cell.line.inspect()).outcome == "FAIL"
             assert not caused(cell, AlarmId.MANY_NO_RESULT)
 
     asyncio.run(scenario())

@@ -14,11 +14,11 @@ def alarms():
     return AlarmManager(Metrics("0", 1.0))
 
 
-def outcome(sequence, *, late=False):
+def outcome(sequence, name="PASS", *, late=False):
     return Outcome(
         sequence=sequence,
         trigger_id=sequence,
-        outcome="NO_RESULT" if late else "PASS",
+        outcome="NO_RESULT" if late else name,
         reasons=(Reason.LATE,) if late else (),
         late=late,
         partial=late,
@@ -47,4 +47,20 @@ def test_a_missed_deadline_returns_to_normal_with_the_next_outcome_in_time(alarm
     monitor.add(outcome(1, late=True))
     assert active(alarms) == {AlarmId.DEADLINE_MISSED}
     monitor.add(outcome(2))
+    assert active(alarms) == set()
+
+
+def test_more_than_half_of_the_last_twenty_that_fail_are_an_alarm_until_they_are_fewer(alarms):
+    monitor = OutcomeMonitor(alarms)
+    for sequence in range(1, 10):
+        monitor.add(outcome(sequence))
+    for sequence in range(10, 20):
+        monitor.add(outcome(sequence, "FAIL"))
+        assert active(alarms) == set()
+    monitor.add(outcome(20, "FAIL"))
+    assert active(alarms) == {AlarmId.REJECT_RATE}
+    monitor.add(outcome(21, "NO_RESULT"))
+    assert active(alarms) == {AlarmId.REJECT_RATE}, "the first that left was a PASS"
+    for sequence in range(22, 31):
+        monitor.add(outcome(sequence))
     assert active(alarms) == set()
