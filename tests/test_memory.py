@@ -31,6 +31,7 @@ def faults(how: str) -> int:
 def test_what_was_freed_is_used_again():
     assert faults("kept") < 0.2 * faults("as it is")
 
+
 HEAPS = """
 import ctypes, sys, threading
 import numpy as np

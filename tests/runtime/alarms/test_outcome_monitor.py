@@ -7,6 +7,7 @@ from station.inspection.alarm_table import AlarmId
 from station.runtime.alarms.manager import AlarmManager
 from station.runtime.alarms.outcome_monitor import OutcomeMonitor
 from station.runtime.observability.metrics import Metrics
+from station.vocabulary import OutcomeName
 
 
 @pytest.fixture
@@ -14,7 +15,7 @@ def alarms():
     return AlarmManager(Metrics("0", 1.0))
 
 
-def outcome(sequence, name="PASS", *, late=False):
+def outcome(sequence: int, name: OutcomeName = "PASS", *, late: bool = False) -> Outcome:
     return Outcome(
         sequence=sequence,
         trigger_id=sequence,
