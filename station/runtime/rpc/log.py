@@ -2,7 +2,7 @@
 
 import logging
 from collections import deque
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 from station.channel.panel_maintenance_queries import LogLine
 
@@ -10,13 +10,21 @@ STORED_LINES = 1000
 _LONGEST = 1000
 
 
+class _Stored(NamedTuple):
+    """A line, in less than half of the memory that its message takes."""
+
+    level: int
+    utc_ms: int
+    logger: str
+    text: str
+
+
 class LogRing(logging.Handler):
     """Log handler that stores the newest lines; it is attached inside `with`."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._lines: deque[LogLine] = deque(maxlen=STORED_LINES)
-        self._numbers: deque[int] = deque(maxlen=STORED_LINES)
+        self._lines: deque[_Stored] = deque(maxlen=STORED_LINES)
 
     def __enter__(self) -> Self:
         logging.getLogger().addHandler(self)
@@ -28,17 +36,16 @@ class LogRing(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Store a line."""
-        line = LogLine(
-            utc_ms=round(1000 * record.created), level=record.levelname, logger=record.name, text=_text(record)
-        )
-        self._lines.append(line)
-        self._numbers.append(record.levelno)
+        self._lines.append(_Stored(record.levelno, round(1000 * record.created), record.name, _text(record)))
 
     def last(self, number: int, level: str) -> tuple[LogLine, ...]:
         """Return the newest lines of a lowest level, by its name, newest last."""
         least = logging.getLevelNamesMapping()[level]
-        chosen = [line for line, found in zip(self._lines, self._numbers, strict=True) if found >= least]
-        return tuple(chosen[-number:])
+        chosen = [line for line in self._lines if line.level >= least]
+        return tuple(
+            LogLine(utc_ms=line.utc_ms, level=logging.getLevelName(line.level), logger=line.logger, text=line.text)
+            for line in chosen[-number:]
+        )
 
 
 def _text(record: logging.LogRecord) -> str:
