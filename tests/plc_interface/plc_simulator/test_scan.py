@@ -1,6 +1,7 @@
 """The scan loop's own part: an end that is asked for is not lost, and a lost connection is made anew."""
 
 import asyncio
+import contextlib
 import socket
 import struct
 
@@ -63,12 +64,13 @@ def to(port):
     """Carry connections to another port."""
 
     async def carry(reader, writer):
-        while data := await reader.read(4096):
-            writer.write(data)
-        writer.close()
+        with contextlib.closing(writer):
+            while data := await reader.read(4096):
+                writer.write(data)
 
     async def relay(reader, writer):
         far_reader, far_writer = await asyncio.open_connection("127.0.0.1", port)
-        await asyncio.gather(carry(reader, far_writer), carry(far_reader, writer))
+        with contextlib.suppress(asyncio.CancelledError):  # by the end of the test's loop
+            await asyncio.gather(carry(reader, far_writer), carry(far_reader, writer))
 
     return relay
