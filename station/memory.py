@@ -13,9 +13,9 @@ def keep_freed_memory() -> None:
     """Configure the C library to retain freed memory, up to 64 MB at its end, in one heap for all threads.
 
     Otherwise every image's memory is mapped anew, page by page, and drawing a frame takes three times as long. With a
-    heap for each thread every thread's largest image stays there: 12 MB more in a station, 95 MB in its twin. Call it
-    before other threads begin. Numbers: mallopt(3), M_TRIM_THRESHOLD, M_MMAP_THRESHOLD and M_ARENA_MAX. A C library
-    without them is left as it is.
+    heap for each thread every thread's largest image stays there: 12 MB more in a station, 95 MB in its twin (two
+    stations side by side, docs/soak.md). Call it before other threads begin. Numbers: mallopt(3), M_TRIM_THRESHOLD,
+    M_MMAP_THRESHOLD and M_ARENA_MAX. A C library without them is left as it is.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:

@@ -13,6 +13,7 @@ from station.twin.clock import SteadyClock
 from station.twin.digit.sensor import DigitSensor
 from station.twin.digit.server import DigitCameraServer, digit_faults
 from station.twin.digit.wire import packed
+from station.twin.ports import stop_listening
 from station.twin.robotiq.faults import gripper_faults
 from station.twin.robotiq.model import RobotiqGripper
 from station.twin.robotiq.urcap import UrcapServer
@@ -56,14 +57,16 @@ PORTS = {
 }
 
 
-async def heard(client: socket.socket, request: bytes) -> bytes:
-    """What a client hears until its connection ends, or nothing more comes."""
+async def heard(client: socket.socket, request: bytes, said: bytes) -> bytes:
+    """What a client hears until something is said, or its connection ends, as it has to where nothing is."""
     answer = b""
-    with contextlib.suppress(OSError, TimeoutError):
-        client.send(request)
-        async with asyncio.timeout(0.3):
+    async with asyncio.timeout(10):
+        with contextlib.suppress(OSError):
+            client.send(request)
             while part := await asyncio.get_running_loop().sock_recv(client, 4096):
                 answer += part
+                if said in answer:
+                    break
     return answer
 
 
@@ -80,15 +83,29 @@ def test_nobody_is_served_after_a_port_was_closed(port: Port, turns: int | None)
             with socket.create_connection((host, port.number(device))) as client:
                 client.setblocking(False)
                 if turns is None:
-                    return await heard(client, port.request)
+                    return await heard(client, port.request, port.said)
                 for _ in range(turns):
                     await asyncio.sleep(0)
                 await device.stop()
                 with contextlib.suppress(OSError):
                     client.recv(4096)
-                return await heard(client, port.request)
+                return await heard(client, port.request, port.said)
         finally:
             await device.stop()
 
     answer = asyncio.run(scenario())
     assert port.said in answer if turns is None else answer == b""
+
+
+def test_a_port_is_closed_also_where_its_closing_is_cut_short():
+    """As the end of the twin does it to a device that is just going away."""
+
+    async def scenario() -> bool:
+        server = await asyncio.start_server(lambda _reader, writer: writer.close(), "127.0.0.1", 0)
+        closing = asyncio.create_task(stop_listening(server))
+        await asyncio.sleep(0)
+        closing.cancel()
+        await asyncio.gather(closing, return_exceptions=True)
+        return server.is_serving()
+
+    assert not asyncio.run(scenario())
