@@ -44,8 +44,8 @@ error, was raised again, and Python adds to an error's traceback each time. It i
 
 Each thread's heap kept that thread's largest images: two stations side by side, on 2026-11-27, had 171 MB after 13
 minutes so, and 159 MB with one heap for all threads, which they have since (`tests/test_memory.py`); their twins had
-314 and 219 MB. What grew after the first quarter of an hour was the log's newest 1,000 lines, for the page Maintenance, until there were so many: in
-some 40 minutes. A line took 0.75 kB, and takes 0.34 kB since.
+314 and 219 MB. What grew after the first quarter of an hour was the log's newest 1,000 lines, for the page Maintenance,
+until there were so many: in some 40 minutes. A line took 0.75 kB, and takes 0.34 kB since.
 
 What is left are steps. In the run of 55 minutes on that day, before the shorter lines, the service had 163.5 MB for
 eight minutes and 165.4 MB for the last eight, to a tenth of a megabyte. Between them, in one window of ten seconds, the
