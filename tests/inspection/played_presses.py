@@ -31,10 +31,11 @@ _SIZE = {
 
 def recipes() -> Iterator[Recipe]:
     """Yield a recipe for each way to decide, to stop, and to use the size."""
+    plain = find_recipe("strawberry", _RECIPES)
     for decided_by in ("every_limit", "first_trusted", "every_trusted"):
         for decides in (False, True):
             for size in (None, _SIZE):
-                values = find_recipe("strawberry", _RECIPES).model_dump(mode="json")
+                values = plain.model_dump(mode="json")
                 values["damage"] = {
                     "area": [
                         {"closing_mm": 3.0, "area_mm2": 70.0, "least_area_mm2": 25.0},
