@@ -1,7 +1,6 @@
 """Freed memory of a process: retained for its next images, or returned to the system."""
 
 import ctypes
-import gc
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
 _KEPT_BYTES = 64 * 2**20
@@ -25,12 +24,10 @@ def keep_freed_memory() -> None:
 
 
 def return_freed_memory() -> None:
-    """Collect unreachable objects, and return what is free to the system.
+    """Return what is free in the heap to the system, also between what is in use.
 
-    It takes milliseconds where the collector's objects were frozen after the start (`gc.freeze`). A C library without
-    malloc_trim(3) retains what is free.
+    Meanwhile, for milliseconds, no other thread gets memory. A C library without malloc_trim(3) retains what is free.
     """
-    gc.collect()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)

@@ -59,3 +59,27 @@ def heaps(how: str) -> int:
 def test_the_threads_share_what_was_freed():
     assert heaps("as it is") > 1
     assert heaps("kept") == 1
+
+
+RETURNED = """
+import psutil
+from station.memory import keep_freed_memory, return_freed_memory
+keep_freed_memory()
+images, lasting, size = [], [], 1_000_000
+for _ in range(80):
+    images.append(size * b"a")
+    lasting.append(size // 1_000 * b"a")
+full = psutil.Process().memory_info().rss
+images.clear()
+kept = psutil.Process().memory_info().rss
+return_freed_memory()
+print(full - kept, kept - psutil.Process().memory_info().rss)
+"""
+
+
+def test_what_was_freed_between_lasting_objects_is_returned_when_asked():
+    command = [sys.executable, "-c", RETURNED]
+    said = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+    retained, returned = (int(each) / 1e6 for each in said.split())
+    assert retained < 10
+    assert returned > 70

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import gc
 import socket
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -61,6 +62,7 @@ class Server(uvicorn.Server):
         self._listener.sweep()
         if self.config.is_ssl and self._listener.ended_unasked and counter % FREED_EACH_TICKS == 0:
             self._listener.ended_unasked = False
+            gc.collect()  # of milliseconds, as what the start has made is frozen
             return_freed_memory()
         return await super().on_tick(counter)
 
