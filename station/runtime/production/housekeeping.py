@@ -25,7 +25,7 @@ _ALARMS_EVERY_S = 1.0
 _BOOK_EVERY_S = 2.0
 _DAMAGE_EVERY_S = 10.0
 _MEMORY_EVERY_S = 60.0
-"""Images leave memory free between lasting objects. It is returned so often, between inspections, in some 3 ms."""
+"""Images leave memory free between lasting objects, which is returned so often at most: an estimate, docs/soak.md."""
 _CLOCK_STEP_S = 2.0
 _RECIPE_WITHIN_S = 10.0
 """The line's time to choose a recipe, before its absence is an alarm."""
