@@ -32,6 +32,8 @@ _RECIPE_WITHIN_S = 10.0
 _MANY_RESTARTS, _MANY_WITHIN_S = 3, 60.0
 _MB = 1_000_000
 _AWAY = {State.UNKNOWN, State.HELD}
+_BETWEEN = {State.IDLE, State.RETREATING, State.RETREATING_READY, State.RETREATING_ACCEPTED}
+"""Nothing is captured, measured or written. A line at full pace triggers during each retreat, and leaves no IDLE."""
 
 
 class Housekeeping:
@@ -78,10 +80,10 @@ class Housekeeping:
                 self._update_alarms()
             if time.monotonic() - self._book_at_s > _BOOK_EVERY_S:
                 await self._refresh_recipes()
-            if self._service.state is State.IDLE and time.monotonic() - self._damage_at_s > _DAMAGE_EVERY_S:
+            if self._service.state in _BETWEEN and time.monotonic() - self._damage_at_s > _DAMAGE_EVERY_S:
                 self._damage_at_s = time.monotonic()
                 self._service.device_changed(await self._service.registry.find_damage())
-            if self._service.state is State.IDLE and time.monotonic() - self._memory_at_s > _MEMORY_EVERY_S:
+            if self._service.state in _BETWEEN and time.monotonic() - self._memory_at_s > _MEMORY_EVERY_S:
                 self._memory_at_s = time.monotonic()
                 return_freed_memory()
             self._metrics.ready(ready=self._interlock.refusal()[0] is None)
