@@ -22,6 +22,10 @@ A_MAPPING = define("settings.a_mapping", "a mapping")
 A_LIST = define_plural("settings.a_list", "a list of {number} item", "a list of {number} items", "number")
 ANOTHER_VALUE = define("settings.another_value", "another value (pydantic: {type})")
 UNKNOWN_KEY = define("settings.unknown_key", "unknown key {name}: expected {known}")
+EARLIER_SETTING = define(
+    "settings.earlier_setting",
+    "{name} is a setting of an earlier version: `station config migrate FILE --write` brings the file up to date",
+)
 UNKNOWN_KEY_NEAR = define("settings.unknown_key_near", "unknown key {name}: did you mean {near}?")
 UNKNOWN_VARIABLE = define(
     "settings.unknown_variable", "unknown variable: see docs/configuration.md for those there are"

@@ -14,6 +14,7 @@ from station.settings.arm import ArmSettings
 from station.settings.calibration import CalibrationSettings
 from station.settings.camera import CameraSettings
 from station.settings.can import CanSettings
+from station.settings.earlier_settings import EARLIER
 from station.settings.environment import CONFIG_VARIABLE, PLACE, named, overrides, variable
 from station.settings.file_content import check_size
 from station.settings.gripper import GripperSettings
@@ -151,7 +152,7 @@ def _loaded(document: Document, chosen: Path | None, environ: Mapping[str, str])
 
     merged = _anchored(merged, document, given, chosen.parent if chosen else Path())
     document = replace(document, problems=(*problems, *document.problems))
-    return validated(Configuration, document, merged, locate)
+    return validated(Configuration, document, merged, locate, EARLIER)
 
 
 def configuration_file(file: Path | None = None, environ: Mapping[str, str] | None = None) -> Path | None:

@@ -4,19 +4,8 @@ from typing import Any, NamedTuple
 
 from station.messages import settings as messages
 from station.settings.commented_text import CommentedText
+from station.settings.earlier_settings import MOVES, WITHOUT_EFFECT, Move
 from station.settings.problems import Problem, SettingsError, dotted, field_name
-
-
-class Move(NamedTuple):
-    """A setting with a new place. An old place is never reused."""
-
-    old: tuple[str, ...]
-    new: tuple[str, ...]
-
-
-MOVES = (Move(("service", "channel"), ("handshake", "endpoint")),)
-WITHOUT_EFFECT = (("arm", "restart_budget"), ("arm", "restart_window_s"))
-"""Settings that are gone: nothing takes their place."""
 
 
 class Migrated(NamedTuple):

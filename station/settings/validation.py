@@ -22,8 +22,17 @@ Locate = Callable[[Where], tuple[Message, Message]]
 """Says where a value was written and what it is called there: `file:line` and `modbus.port`."""
 
 
-def validated(model: type[Model], document: Document, value: Any, locate: Locate) -> Model:
+def validated(
+    model: type[Model],
+    document: Document,
+    value: Any,
+    locate: Locate,
+    earlier: frozenset[tuple[str, ...]] = frozenset(),
+) -> Model:
     """Validate plain values: mappings, lists, texts, numbers, truth values and None.
+
+    Args:
+        earlier: the places of an earlier version's settings, which `station config migrate` moves or removes.
 
     Raises:
         SettingsError: all problems.
@@ -37,7 +46,7 @@ def validated(model: type[Model], document: Document, value: Any, locate: Locate
                 return checked
     except ValidationError as error:
         for details in error.errors():
-            problems += _problems(details, value, schema_of(model), locate, document.doubtful)
+            problems += _problems(details, value, schema_of(model), locate, document.doubtful, earlier)
     raise SettingsError(sorted(dict.fromkeys(problems), key=_line))
 
 
@@ -48,7 +57,12 @@ def _line(problem: Problem) -> int:
 
 
 def _problems(
-    details: ErrorDetails, value: Any, root: Node, locate: Locate, doubtful: frozenset[Where]
+    details: ErrorDetails,
+    value: Any,
+    root: Node,
+    locate: Locate,
+    doubtful: frozenset[Where],
+    earlier: frozenset[tuple[str, ...]],
 ) -> list[Problem]:
     """Convert one error of pydantic to problems; none if the loader has reported it already."""
     kind, given, context = details["type"], details["input"], details.get("ctx", {})
@@ -62,6 +76,8 @@ def _problems(
     cause = context.get("error")
     if isinstance(cause, FieldError):
         return [Problem(*locate(path + inner), expected) for inner, expected in cause.parts]
+    if kind == "extra_forbidden" and path in earlier:
+        return [Problem(*locate(path), messages.EARLIER_SETTING(name=str(path[-1])))]
     if kind == "extra_forbidden":
         return [Problem(*locate(path), _unknown(str(path[-1]), names(root, path[:-1])))]
     if isinstance(cause, WantedError):

@@ -87,7 +87,7 @@ NEWER = {
     # A setting has another name, and the records have another form.
     "station/settings/hmi.py": ("    idle_s: float", "    logged_out_after_s: float"),
     "hmi/web/app.py": ("settings.idle_s", "settings.logged_out_after_s"),
-    "station/settings/migration.py": (
+    "station/settings/earlier_settings.py": (
         "MOVES = (", 'MOVES = (Move(("hmi", "idle_s"), ("hmi", "logged_out_after_s")), '
     ),
     # Without pages where a file says so: it does not become ready.

@@ -14,6 +14,8 @@ from station.settings.schema import leaves, schema_of
 from station.settings.validation import validated
 from station.settings.yaml_loader import parse_document
 
+EARLIER = "is a setting of an earlier version: `station config migrate FILE --write` brings the file up to date"
+
 
 def problems(file: Path | None = None, **environ: str) -> list[str]:
     with pytest.raises(SettingsError) as caught:
@@ -121,6 +123,10 @@ class TestBadFile:
         [
             ("modbus:\n  prot: 1\n", "2: modbus.prot: unknown key prot: did you mean port?"),
             ("plc: {}\n", f"1: plc: unknown key plc: expected {', '.join(Configuration.model_fields)}"),
+            *(
+                (f"{section}:\n  {name}: 9\n", f"2: {section}.{name}: {name} {EARLIER}")
+                for section, name in (("service", "channel"), ("arm", "restart_budget"), ("arm", "restart_window_s"))
+            ),
             ("\nmetrics: 5020\n", "2: metrics: expected a mapping with host, port, got 5020"),
             ("home:\n", "1: home: expected a path, got nothing"),
             (
