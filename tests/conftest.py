@@ -25,8 +25,8 @@ from station.cli import main
 from tests.ports import free_port, free_ports
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
-KEPT = tuple(Path(__file__).parent / folder for folder in ("hmi_pages", "hmi"))
-"""Folders for which a whole station is kept running."""
+KEPT = (("hmi_pages",), ("hmi",), ("plc_interface/registers/generate", "runtime/test_plc_program.py"))
+"""Tests that share what takes long to make: a whole station that runs, another one, the parsed Structured Text."""
 GRACE_S = 3.0
 
 settings.register_profile("busy machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -57,19 +57,21 @@ def pytest_collection_finish() -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep a folder's tests together, in whatever order they are, and begin a worker's share with a folder of `KEPT`.
+    """Keep a folder's tests together, in whatever order they are, and begin a worker's share with tests of `KEPT`.
 
-    A worker's share begins so many items after the one before (xdist's `worksteal`), and others take from its end: the
-    folder's tests stay with one worker, which starts their station once.
+    A worker's share begins so many items after the one before (xdist's `worksteal`), and others take from its end: such
+    tests stay with one worker, which makes what they share once.
     """
     order: dict[Path, int] = {}
     for item in items:
         order.setdefault(item.path.parent, len(order))
     items.sort(key=lambda item: order[item.path.parent])
     workers, count = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")), len(items)
-    for number, folder in enumerate(KEPT):
-        tests = [item for item in items if item.path.parent == folder]
-        items[:] = [item for item in items if item.path.parent != folder]
+    for number, names in enumerate(KEPT):
+        paths = {Path(__file__).parent / name for name in names}
+        tests = [item for item in items if not paths.isdisjoint((item.path, *item.path.parents))]
+        kept = {id(item) for item in tests}
+        items[:] = [item for item in items if id(item) not in kept]
         begin = number * count // workers
         items[begin:begin] = tests
 

@@ -28,6 +28,7 @@ from playwright.sync_api import Error as BrowserError
 from playwright.sync_api import TimeoutError as BrowserTimeout
 
 from hmi.web.app import make_app, make_context
+from hmi.web.render import Renderer
 from station.channel.client import ChannelClient
 from station.channel.line import (
     Acknowledged,
@@ -479,13 +480,23 @@ class Pages:
         return self("POST", path, urlencode(fields).encode(), headers=headers)
 
 
+_FIRST: list[tuple[Any, Renderer]] = []
+"""The first test's routes and templates, for all tests of a process: to resolve them takes as long as many requests."""
+
+
 @pytest.fixture
-def pages(tmp_path: Path) -> Pages:
+def pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pages:
     """The web application over a station that is not there."""
+    if _FIRST:
+        monkeypatch.setattr("hmi.web.app.Renderer", lambda _assets: _FIRST[0][1])
     site = load_configuration(None, {"STATION_HOME": str(tmp_path)})
-    file = tmp_path / "station.yaml"
-    context = make_context(site, file)
-    return Pages(make_app(context), context)
+    context = make_context(site, tmp_path / "station.yaml")
+    app = make_app(context)
+    if not _FIRST:
+        _FIRST.append((app._app, context.renderer))
+    app._app = _FIRST[0][0]
+    app._app.state.hmi = context
+    return Pages(app, context)
 
 
 @pytest.fixture
