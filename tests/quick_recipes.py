@@ -12,8 +12,9 @@ NUMBERS = {"strawberry": 1, "blueberry": 2, "raspberry": 3}
 def quick_recipes(folder: Path, settle_s: float = 0.02) -> Path:
     """Write the shipped recipes with few steps of one frame each, and return their folder."""
     folder.mkdir(exist_ok=True)
+    shipped = load_recipes()
     for name in NUMBERS:
-        values = load_recipes()[name].model_dump(mode="json")
+        values = shipped[name].model_dump(mode="json")
         limits_mm = [limit["closing_mm"] for limit in values["damage"]["area"]]
         values["steps"] |= {"number": 4, "result_closings_mm": limits_mm, "closing_limit_mm": 4.5}
         values["imaging"] |= {"settle_s": settle_s, "frames_per_step": 1, "reference_frames": 3}

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from station.errors import BadInputError
 from station.messages import settings as messages
 from station.messages.message import Message
+from station.settings.file_content import read_content
 from station.settings.problems import Problem, SettingsError, shortened, shortened_file
 from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import content_sha256, recipe_of
@@ -36,7 +37,7 @@ def load_recipe(path: Path) -> Recipe:
     Raises:
         SettingsError: all problems of the file.
     """
-    return recipe_of(read_document(path))
+    return recipe_of(read_content(path), shortened_file(path))
 
 
 def load_recipes(folder: Path | None = None) -> dict[str, Recipe]:

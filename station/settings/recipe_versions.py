@@ -4,13 +4,14 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 from station.messages import settings as messages
 from station.settings.problems import Problem
 from station.settings.recipe_model import Recipe
 from station.settings.validation import validated
-from station.settings.yaml_loader import Document, parse_document
+from station.settings.yaml_loader import parse_document
 
 SCHEMA_VERSION = 1
 """The `schema_version` that this program reads and writes."""
@@ -27,15 +28,17 @@ def parse_recipe(text: str, source: str) -> Recipe:
     Raises:
         SettingsError: all problems of the recipe.
     """
-    return recipe_of(parse_document(text.encode(), source))
+    return recipe_of(text.encode(), source)
 
 
-def recipe_of(document: Document) -> Recipe:
-    """Validate a recipe from a file's content, of this or an earlier schema version.
+@lru_cache(maxsize=16)  # a start and each change of a file read every recipe four times
+def recipe_of(content: bytes, source: str) -> Recipe:
+    """Parse a recipe from a file's content, of this or an earlier schema version.
 
     Raises:
         SettingsError: all problems of the recipe.
     """
+    document = parse_document(content, source)
     values = document.value
     form = values.get("schema_version") if isinstance(values, dict) else None
     if isinstance(form, int) and form > SCHEMA_VERSION:
