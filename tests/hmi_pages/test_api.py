@@ -4,13 +4,14 @@ import re
 import time
 from collections.abc import Callable
 from typing import Any
-from urllib.parse import quote, unquote
+from urllib.parse import quote
 
 import pytest
 import schemathesis
 from hypothesis import HealthCheck, assume, given, settings
 
 from hmi.web.roles import Role
+from station.channel.panel_live import LONGEST_LOT
 from station.records.audit_report import read_audit
 from station.records.database import reading as open_records
 
@@ -51,15 +52,6 @@ def test_every_operation_is_tried(schema: Any) -> None:
     assert known == set(OPERATIONS)
 
 
-def _is_utf8(escaped: str) -> bool:
-    """Whether a path's part is UTF-8 once its percent signs are resolved."""
-    try:
-        unquote(escaped, errors="strict")
-    except UnicodeDecodeError:
-        return False
-    return True
-
-
 @pytest.mark.parametrize(("method", "path"), OPERATIONS)
 def test_no_5xx_and_no_undocumented_answer(schema: Any, writing: str, method: str, path: str) -> None:
     operation = schema[path][method]
@@ -67,8 +59,10 @@ def test_no_5xx_and_no_undocumented_answer(schema: Any, writing: str, method: st
     @settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow])
     @given(case=operation.as_strategy())
     def check(case: Any) -> None:
-        # Schemathesis escapes not every percent sign: a lot "%EA" would arrive as a byte that is no UTF-8.
-        assume(all(_is_utf8(str(value)) for value in case.path_parameters.values()))
+        # Schemathesis escapes some paths' percent signs only: a lot "%EA" would arrive as a byte that is no UTF-8.
+        case.path_parameters = {name: str(value).replace("%", "%25") for name, value in case.path_parameters.items()}
+        # What the schema says of a name's length it asks of the escaped one, which is longer than what arrives.
+        assume(all(len(value) <= LONGEST_LOT for value in case.path_parameters.values() if "%" in value))
         case.call_and_validate(headers={"Authorization": f"Bearer {writing}"}, timeout=60)
 
     check()
