@@ -75,7 +75,8 @@ def demonstration(folder: Path, server: Any, fruits: int, host: str) -> Iterator
         "modbus": {"port": modbus},
         "metrics": {"port": metrics},
         "hmi": {"port": hmi},
-        # The controller's watchdog stops a station that a busy machine lets wait for half a second: a person's to end.
+        # At the shipped 2 Hz the controller stops the program of a station that a busy machine lets wait half a second,
+        # and a person may have to start it again.
         "arm": {"host": host, "stale_after_s": 1.0, "link_lost_after_s": 4.0, "watchdog_hz": 0.5},
         "gripper": {"urcap": {"host": host}, "modbus_rtu": {"host": host}, "answer_timeout_s": 2.0},
         "camera": {"oldest_s": 2.0, "twin": {"port": camera}},

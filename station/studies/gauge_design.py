@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from station.settings.recipe import find_recipe
 from station.studies.gauge import analyse
 from station.studies.gauge_dummies import (
     DUMMY_TRUTHS,
@@ -19,7 +20,6 @@ from station.studies.gauge_dummies import (
 from station.studies.gauge_grip import deciding_closing_mm
 from station.studies.gauge_twin import PART_TRUTHS, GaugeTask, Simulated, good_and_damaged_mm2, measure_part
 from station.studies.grr import GaugeStudy, Origin, analysed
-from station.studies.recipes import shipped_recipe
 from station.studies.workers import on_this_machine
 
 _MEASURED = "and the sensor, its light and the method: as measured"
@@ -88,7 +88,7 @@ def _measured(design: TwinDesign, on_done: Callable[[], None]) -> list[Simulated
 
 
 def _fruit_facts(design: TwinDesign) -> list[tuple[str, str]]:
-    closing_mm = deciding_closing_mm(shipped_recipe(design.fruit))
+    closing_mm = deciding_closing_mm(find_recipe(design.fruit))
     return [
         ("Parts", f"{design.parts} fruit of the twin: {design.fruit}, every second one bruised, seed {design.seed}"),
         ("Operators", f"{design.operators}: another sensor unit, gripper zero and habit each; fruit placed again"),

@@ -12,10 +12,10 @@ from functools import cache
 import cv2
 import numpy as np
 
+from station.settings.recipe import find_recipe
 from station.studies.gauge_grip import FruitRig, Grip, true_area_mm2
 from station.studies.gauge_table import Measurement
 from station.studies.gauge_twin import GaugeTask, Simulated, setup_of
-from station.studies.recipes import shipped_recipe
 from station.twin.contact import Pose
 from station.twin.fruit import Fruit, Kind, draw_fruit
 from station.twin.gel import MM_PER_PX
@@ -47,7 +47,7 @@ def stop_mm(fruit: str) -> float:
     """
     largest = _ball(LARGEST_MM)
     areas = [true_area_mm2(largest, Pose(), closing_mm) for closing_mm in _CLOSINGS_MM]
-    return round(float(np.interp(shipped_recipe(fruit).damage.area[-1].area_mm2, areas, _CLOSINGS_MM)), 1)
+    return round(float(np.interp(find_recipe(fruit).damage.area[-1].area_mm2, areas, _CLOSINGS_MM)), 1)
 
 
 def measure_dummy(task: GaugeTask, parts: int) -> Simulated:
@@ -60,7 +60,7 @@ def measure_dummy(task: GaugeTask, parts: int) -> Simulated:
         The measurement with the truth of `DUMMY_TRUTHS`.
     """
     cv2.setNumThreads(1)
-    recipe, ball, unit = shipped_recipe(task.fruit), ball_of(task, parts), setup_of(task).unit
+    recipe, ball, unit = find_recipe(task.fruit), ball_of(task, parts), setup_of(task).unit
     generator = np.random.default_rng([task.seed, 104, task.part, task.operator, task.repeat])
     refused = 0
     while True:

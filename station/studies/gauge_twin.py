@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 
 from station.inspection.judge import judge
+from station.settings.recipe import find_recipe
 from station.studies.cohort import member
 from station.studies.gauge_grip import FruitRig, Grip, deciding_closing_mm, true_area_mm2
 from station.studies.gauge_table import Measurement
-from station.studies.recipes import shipped_recipe
 from station.twin.contact import Pose
 from station.twin.fruit import Fruit
 
@@ -106,7 +106,7 @@ def measure_part(task: GaugeTask) -> Simulated:
         The measurement with the truths of `PART_TRUTHS`.
     """
     cv2.setNumThreads(1)
-    recipe = shipped_recipe(task.fruit)
+    recipe = find_recipe(task.fruit)
     fruit, setup, pose = part_of(task), setup_of(task), pose_of(task)
     generator = np.random.default_rng([task.seed, 103, task.part, task.operator, task.repeat])
     grip = Grip(recipe, FruitRig(fruit, pose, setup.unit, int(generator.integers(2**31))))
@@ -127,7 +127,7 @@ def good_and_damaged_mm2(fruit: str, seed: int) -> tuple[float, float]:
 
     Their difference is the tolerance.
     """
-    closing_mm = deciding_closing_mm(shipped_recipe(fruit))
+    closing_mm = deciding_closing_mm(find_recipe(fruit))
 
     def mean(*, bruised: bool) -> float:
         members = [member(fruit, seed, number) for number in range(_TOLERANCE_FRUIT)]

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
+from station.settings.recipe import find_recipe
 from station.settings.segmentation import Segmentation
 from station.studies.cohort import member
-from station.studies.recipes import shipped_recipe
 from station.vision.methods import make_method
 from station.vision.press import PressTracker
 
@@ -42,7 +42,7 @@ class SampleResult(BaseModel):
 
 def segmentation_of(fruit: str, method: str) -> Segmentation:
     """Return the segmentation of the fruit's shipped recipe, with the requested method, `paper` or `robust`."""
-    return shipped_recipe(fruit).segmentation.model_copy(update={"method": method})
+    return find_recipe(fruit).segmentation.model_copy(update={"method": method})
 
 
 def measure_sample(task: Task) -> SampleResult:

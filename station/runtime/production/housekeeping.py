@@ -33,7 +33,7 @@ _MANY_RESTARTS, _MANY_WITHIN_S = 3, 60.0
 _MB = 1_000_000
 _AWAY = {State.UNKNOWN, State.HELD}
 _BETWEEN = {State.IDLE, State.RETREATING, State.RETREATING_READY, State.RETREATING_ACCEPTED}
-"""Nothing is captured, measured or written. A line at full pace triggers during each retreat, and leaves no IDLE."""
+"""No image is captured or measured. A line at full pace triggers during the retreat, and IDLE is rarely seen."""
 
 
 class Housekeeping:
