@@ -52,11 +52,11 @@ eight minutes and 165.4 MB for the last eight, to a tenth of a megabyte. Between
 machine was busy elsewhere (the PLC's p99 was four times as long), and the service took 1.9 MB and the twin some more
 that they keep: freed memory is retained on purpose (`station/memory.py`), so a slope over an hour is the steps'.
 
-The service returns such memory since: once a minute, at first where it waited for a trigger just then. Of two stations
-side by side for 12 minutes on that day, the one without it stepped from 153.6 to 157.6 MB and stayed there; the one
-with it stepped from 154.8 to 158.5, and had 154.9 again from the next return on. A line at full pace triggers during
-the retreat and hardly lets the station wait: traced later that day, the service returned nothing in 150 seconds. It does so
-during the retreat too now. The figures above are from before it."""
+The service returns such memory since: once a minute, at first where it waited for a trigger just then. Of two
+stations side by side for 12 minutes on that day, the one without it stepped from 153.6 to 157.6 MB and stayed there;
+the one with it stepped from 154.8 to 158.5, and had 154.9 again from the next return on. A line at full pace triggers
+during the retreat and hardly lets the station wait: traced later that day, the service returned nothing in 150
+seconds. It does so during the retreat too now. The figures above are from before it."""
 """Written by hand: the stories behind a figure that was wrong once."""
 
 
