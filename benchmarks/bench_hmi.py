@@ -194,7 +194,7 @@ def measure(running: Demo, browser: Browser, rounds: int, seconds: float) -> str
     with nicegui(running.configuration) as (_, address):
         peer = first_load(browser, address, PEER_PICTURE)
     parts = {name: running.part(name) for name in ("hmi", "service")}
-    who = {
+    who: dict[str, Callable[[], contextlib.AbstractContextManager[Any]]] = {
         NOBODY: contextlib.nullcontext,
         PANELS: lambda: clients("panels", LOOKERS, host, port),
         READERS: lambda: clients("readers", HISTORY_READERS, host, port),

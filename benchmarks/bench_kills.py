@@ -24,6 +24,7 @@ from collections import Counter
 from collections.abc import AsyncIterator
 from contextlib import closing
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from reliability.kills import Restarts, check_station, kill_in_round
@@ -160,8 +161,9 @@ async def rounds_of_one_station(seed: int, number: int) -> AsyncIterator[Round |
 
     What a station with something wrong leaves is kept, and its place printed.
     """
+    placings: tuple[Literal["nest", "arm"], ...] = ("nest", "arm", "arm", "arm")
     chance, scenario = random.Random(seed), Scenario(name="kills", fault=None, expected=Expected(outcomes=("PASS",)))
-    placing, place = chance.choice(("nest", "arm", "arm", "arm")), Path(tempfile.mkdtemp())
+    placing, place = chance.choice(placings), Path(tempfile.mkdtemp())
     kills, wrong, restarts = 0, False, Restarts()
     async with running(place, scenario, placing, LIMIT_MM2) as rig:
         for each in range(ROUNDS_A_STATION):

@@ -52,7 +52,7 @@ class Figures(NamedTuple):
 def serve_ours(port: int, *, priority: bool) -> None:
     """Our server, as its process runs it, but for a connection's limit, which would hide what a closed loop shows."""
     logging.disable(logging.CRITICAL)
-    connection.REQUESTS_PER_S = _UNLIMITED_PER_S
+    connection.REQUESTS_PER_S = _UNLIMITED_PER_S  # pyrefly: ignore[bad-assignment] (a constant)
 
     async def serve() -> None:
         most = 2 * max(CLIENTS)

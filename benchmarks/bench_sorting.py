@@ -94,7 +94,7 @@ def main() -> None:
     counts: dict[str, int] = dict.fromkeys((SOUND, Severity.SEVERE, Severity.MILD), asked.count)
     counts[Severity.PATCH] = asked.count // 3
     tasks = [
-        Task(kind, str(group), seeds, number)
+        Task(kind, group, seeds, number)
         for seeds in asked.seeds
         for kind in asked.kinds
         for group, count in counts.items()

@@ -53,7 +53,7 @@ def scikit_kmeans(denoised: np.ndarray, parameters: PaperParameters) -> object:
     pixels = denoised.reshape(-1, 3).astype(np.float32)
     return KMeans(
         parameters.clusters,
-        n_init=parameters.kmeans_starts,  # pyright: ignore[reportArgumentType] (scikit-learn says str, and takes numbers)
+        n_init=parameters.kmeans_starts,
         max_iter=10,
         tol=1e-3,
         random_state=parameters.seed,

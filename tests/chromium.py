@@ -5,6 +5,8 @@ from playwright.sync_api import Locator
 _WITHOUT = (
     # They keep a process ready for the address bar's suggestions: half a second of a core for each window.
     "WebUIOmniboxPopup", "WebUIOmniboxAimPopup", "WebUIOmniboxFullPopup",
+    # It begins a process for the next page before there is one.
+    "SpareRendererForSitePerProcess",
     # Playwright switches these off too, by an argument that this one takes the place of.
     "AimEnabled", "HttpsUpgrades", "PaintHolding", "OptimizationHints", "MediaRouter",
 )  # fmt: skip

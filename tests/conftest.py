@@ -85,7 +85,7 @@ def _remember_tasks() -> None:
         _TASKS.add(weakref.ref(task, _TASKS.discard))
         return task
 
-    asyncio.BaseEventLoop.create_task = create_task  # type: ignore[method-assign]
+    asyncio.BaseEventLoop.create_task = create_task
 
 
 _remember_tasks()
@@ -249,7 +249,7 @@ def analyze_apart() -> Callable[..., subprocess.CompletedProcess[str]]:
 
     def run(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "station", "analyze", *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=90, check=False, **options)  # type: ignore[call-overload]
+        return subprocess.run(command, capture_output=True, text=True, timeout=90, check=False, **options)  # pyrefly: ignore[no-matching-overload]
 
     return run
 

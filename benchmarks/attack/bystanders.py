@@ -99,7 +99,7 @@ class Browser:
             OSError: no connection, or no response in time.
             HTTPException: no whole response.
         """
-        host, port = str(self._url.hostname), int(self._url.port or 0)
+        host, port = str(self._url.hostname), self._url.port or 0
         if self._url.scheme == "https":
             context = ssl._create_unverified_context()  # noqa: SLF001 (the attack's own certificate)
             line = HTTPSConnection(host, port, timeout=STOP_S, source_address=self._source, context=context)

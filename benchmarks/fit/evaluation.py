@@ -149,7 +149,7 @@ def _recorded(constants: Constants) -> tuple[Constants, Callable[[], int]]:
     """The same constants, and a function that returns the bits of those that were read since it was last called."""
     names: set[str] = set()
 
-    class Recorder(Constants):
+    class Recorder(Constants):  # pyrefly: ignore[bad-class-definition] (it is no dataclass of its own)
         __slots__ = ()
 
         def __getattribute__(self, name: str) -> Any:

@@ -140,13 +140,12 @@ def groups(part: Part, images: Path, cache: Path) -> Groups:
 
 
 def _some_steps(press: PressData) -> PressData:
-    images, truths = ([some[k] for k in FRUIT_STEPS] for some in (press.images, press.truths))
-    return press._replace(images=images, truths=truths)
+    return press._replace(images=[press.images[k] for k in FRUIT_STEPS], truths=[press.truths[k] for k in FRUIT_STEPS])
 
 
 def _last_of_three(press: PressData) -> PressData:
-    images, truths = (some[SOFT_EVERY - 1 :: SOFT_EVERY] for some in (press.images, press.truths))
-    return press._replace(images=images, truths=truths)
+    last = slice(SOFT_EVERY - 1, None, SOFT_EVERY)
+    return press._replace(images=press.images[last], truths=press.truths[last])
 
 
 def _version(images: Path) -> str:

@@ -32,9 +32,9 @@ def cluster(workers: int) -> Iterator[str]:
         n_workers=workers,
         threads_per_worker=1,
         processes=True,
-        dashboard_address=None,  # pyright: ignore[reportArgumentType] (None is no dashboard)
+        dashboard_address=None,
     ) as running:
-        yield running.scheduler_address  # pyright: ignore[reportAttributeAccessIssue] (known at run time)
+        yield running.scheduler_address
 
 
 def measure(folder: Path, workers: int, samples: int) -> Run:

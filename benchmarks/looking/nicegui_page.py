@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from fastapi.responses import Response
-from nicegui import app, ui  # type: ignore[import-not-found] (an environment of its own has it)
+from nicegui import app, ui  # pyrefly: ignore[missing-import] (an environment of its own has it)
 
 from hmi.run import charts
 from hmi.web.gateway import Gateway

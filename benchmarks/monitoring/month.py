@@ -178,7 +178,7 @@ class Line:
         judged = outcome != "NO_RESULT"
         spread = math.exp(self._random.gauss(0.45 if outcome == "FAIL" else 0.0, 0.2))
         seconds = 6.0 + abs(self._random.gauss(0.0, 0.8))
-        told = Outcome.model_construct(
+        told = Outcome.model_construct(  # pyrefly: ignore[missing-argument] (what the metrics read)
             outcome=outcome, reasons=reasons, late=self._random.random() < 0.0005, duration_ms=round(1000 * seconds),
             area_mm2=_AREAS_MM2[kind] * spread if judged else None, closing_mm=4.0 * spread if judged else None,
         )  # fmt: skip

@@ -350,6 +350,6 @@ def _fork(work: Callable[[], int]) -> int:
         silent = os.open(os.devnull, os.O_WRONLY)
         os.dup2(silent, 1)
         os.dup2(silent, 2)
-        code = int(work())
+        code = work()
     finally:
         os._exit(code)

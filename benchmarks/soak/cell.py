@@ -178,7 +178,7 @@ async def running() -> AsyncIterator[Cell]:
             looking = clients(who, count, site.hmi.host, site.hmi.port)
             # Not on this loop, which feeds the supervisor, until the first of them is answered.
             await asyncio.to_thread(looking.__enter__)
-            stack.push(looking)
+            stack.push(looking.__exit__)
         line, task = await stack.enter_async_context(feeding(site, console_port))
         yield Cell(site, server, line, task)
 

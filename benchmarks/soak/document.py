@@ -291,7 +291,8 @@ def page(samples: Sequence[Sample], ending: Ending, minutes: float, trouble: str
         *textwrap.wrap(images, WIDTH, subsequent_indent="  "),
         *textwrap.wrap(outbox, WIDTH, subsequent_indent="  "),
         "",
-        *([FOUND, ""] if FOUND else []),
+        FOUND,
+        "",
         f"Machine: {os.cpu_count()} cores, load {load:.1f}, which twin, line, clients, databases and station share.",
         "",
     ]

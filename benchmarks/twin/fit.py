@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -258,7 +258,7 @@ def main(arguments: Sequence[str]) -> int:
         background_mean=mean.astype(np.float16),
         background_modes=modes.astype(np.float16),
         background_fitted=weights.astype(np.float32),
-        **{f"noise_{name}": level for name, level in asdict(fit_noise(presses)).items()},
+        **dict[str, Any]({f"noise_{name}": level for name, level in asdict(fit_noise(presses)).items()}),
     )
     print(f"{target}: fitted on {len(presses)} presses and {len(backgrounds)} backgrounds")
     return 0

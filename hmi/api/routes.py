@@ -143,7 +143,7 @@ async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeDetails:
     found = next((each for each in (await hmi.past.recipes.read()).states if each.name == name), None)
     if found is None:
         raise HTTPException(404, f"there is no recipe {name}; /api/v1/recipes lists them")
-    values = found.control and found.control.recipe.model_dump(mode="json")
+    values = found.control.recipe.model_dump(mode="json") if found.control else None
     return RecipeDetails(**_short(found), values=values)
 
 

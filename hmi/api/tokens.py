@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from hmi.web.roles import Role
 from station.atomic_file import write_atomically
@@ -116,7 +116,7 @@ class ApiTokens:
                 self._seen = seen
         except FileNotFoundError:
             self._tokens, self._seen = {}, None
-        except (OSError, ValueError, ValidationError) as error:
+        except (OSError, ValueError) as error:
             self._tokens, self._seen = {}, None
             raise StationError(f"{self._path} cannot be read: {error}; put a good copy in its place") from error
 

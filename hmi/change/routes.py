@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
 from fastapi import APIRouter, Depends, Form, Path, Request
-from pydantic import ValidationError
 from starlette.responses import Response
 
 from hmi.web.access import HmiNow, LocaleNow, orders
@@ -130,7 +129,7 @@ def changes(now: RecipeSummary | None, then: RecipeSummary, locale: Locale) -> l
 def _values(shown: RecipeSummary, w: Locale) -> dict[str, str]:
     try:
         recipe = Recipe.model_validate_json(json.dumps(json.loads(shown.values)))
-    except (ValueError, ValidationError):  # of another form of the program
+    except ValueError:  # of another form of the program
         return {"revision": shown.revision}
     width, steps, damage = recipe.expected_width, recipe.steps, recipe.damage
     limits = ", ".join(f"{w.number(a.area_mm2)} mm² ({w.number(a.closing_mm, 1)} mm)" for a in damage.area)

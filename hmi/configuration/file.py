@@ -55,6 +55,6 @@ def changes(old: str, new: str) -> tuple[dict[str, JsonValue], dict[str, JsonVal
 def _leaves(value: JsonValue, path: str) -> Iterator[tuple[str, JsonValue]]:
     if isinstance(value, Mapping):
         for name, inner in value.items():
-            yield from _leaves(inner, f"{path}.{name}" if path else str(name))
+            yield from _leaves(inner, f"{path}.{name}" if path else name)
     elif path:
         yield path, value

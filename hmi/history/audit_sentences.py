@@ -51,7 +51,7 @@ def _who(row: AuditRow, locale: Locale) -> str:
 def _subject(row: AuditRow, locale: Locale) -> str:
     kind, _, rest = row.subject.partition(" ")
     if kind == "alarm" and (known := _ALARMS.get(rest)):
-        return str(locale.sentence(known.cause()))
+        return locale.sentence(known.cause())
     if kind == "recipe" and (revision := _REVISION.fullmatch(rest)):
         return locale.text("audit.recipe_revision", name=revision[1], n=revision[2])
     return rest if kind in {"recipe", "lot"} and rest else row.subject

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Form, Query, Request
 from markupsafe import Markup
-from pydantic import StringConstraints, ValidationError
+from pydantic import StringConstraints
 from starlette.responses import Response
 
 from hmi.common.charts import area_over_closing, deciding_limit, mark_decided
@@ -52,12 +52,12 @@ def search_of(
             lot=lot or None,
             grower=grower or None,
             fruit=fruit or None,
-            outcome=outcome or None,  # type: ignore[arg-type] (checked by the model)
+            outcome=outcome or None,  # pyrefly: ignore[bad-argument-type] (checked by the model)
             reason=Reason(reason) if reason else None,
             from_utc_ms=_utc_ms(begun_from),
             to_utc_ms=_utc_ms(begun_to),
         )
-    except (ValueError, ValidationError, OverflowError):
+    except (ValueError, OverflowError):
         return None
 
 
@@ -91,7 +91,7 @@ async def search(
         "history.html.j2",
         status=200 if wanted is not None else 400,
         terms=terms,
-        chips=chips(terms, hmi.gateway.state and hmi.gateway.state.lot, today),
+        chips=chips(terms, hmi.gateway.state.lot if hmi.gateway.state else None, today),
         days=days(terms, today),
         bad=wanted is None,
         found=found,
@@ -168,7 +168,7 @@ async def inspection(request: Request, hmi: HmiNow, locale: LocaleNow, sequence:
         before=before,
         after=after,
         reasons=[(str(code), reason_message(code)) for code in (reply.standing.reasons if reply.standing else ())],
-        limit=deciding_limit(_limits(reply)[0], reply.standing and reply.standing.closing_mm),
+        limit=deciding_limit(_limits(reply)[0], reply.standing.closing_mm if reply.standing else None),
         chart=_chart(reply, locale),
         steps=_steps(reply),
         reference=next((each for each in reply.images if each.kind == "reference"), None),
@@ -280,7 +280,7 @@ def _chart(reply: FullRecord, locale: Locale) -> Markup | None:
     limits, early = _limits(reply)
     label = locale.text("chart.fruit_label", n=reply.sequence)
     marks: list[Mark] = ["point"] * len(points)
-    mark_decided(marks, points, reply.standing and reply.standing.closing_mm)
+    mark_decided(marks, points, reply.standing.closing_mm if reply.standing else None)
     return area_over_closing([Curve("own", points, marks)], limits, locale, label, early)
 
 

@@ -68,8 +68,8 @@ async def recipes(request: Request, hmi: HmiNow) -> Response:
 async def recipe(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
     """Show one recipe: the revision in force, the draft, the differences, the possible actions."""
     state = await _state(hmi, name)
-    shown = recipe_of(state.submitted) if state.submitted else state.control and state.control.recipe
-    new = shown if state.submitted else state.file and state.file.recipe
+    shown = recipe_of(state.submitted) if state.submitted else state.control.recipe if state.control else None
+    new = shown if state.submitted else state.file.recipe if state.file else None
     changes = changes_of(state.control.recipe, new) if state.control and new else ()
     drawn = None if shown is None else await _drawn(hmi, locale, shown, shown.model_dump(mode="json"))
     return show(request, "recipe.html.j2", row=state, changes=changes, drawn=drawn, tab="standing")

@@ -125,7 +125,7 @@ async def _problem(request: Request, error: Problem) -> Response:
 
 async def _http(request: Request, error: HTTPException) -> Response:
     key = {404: "problem.not_found", 405: "problem.not_found"}.get(error.status_code)
-    answer = _problem_answer(request, error.status_code, locale_of(request).text(key) if key else str(error.detail))
+    answer = _problem_answer(request, error.status_code, locale_of(request).text(key) if key else error.detail)
     answer.headers.update(error.headers or {})
     if error.status_code == 405:
         answer.headers["allow"] = ", ".join(sorted(_methods(request)))

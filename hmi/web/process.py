@@ -77,7 +77,7 @@ def _server(listener: GuardedListener, settings: HmiSettings, app: ASGIApp) -> S
     )
     try:
         server.config.load()
-    except (OSError, ssl.SSLError) as error:
+    except OSError as error:
         raise BadInputError(
             f"hmi.tls: {tls.certificate} and {tls.key} cannot be used: {error}; name a certificate and its key in PEM"
         ) from error

@@ -28,7 +28,7 @@ class Renderer:
             auto_reload=False,
             extensions=["jinja2.ext.do"],
         )
-        self._environment.globals["static"] = assets.address
+        self._environment.globals["static"] = assets.address  # pyrefly: ignore[unsupported-operation] (any value may be one)
 
     def render(self, template: str, locale: Locale, values: Mapping[str, Any]) -> Markup:
         """Render the template of a file name.

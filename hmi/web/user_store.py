@@ -9,7 +9,7 @@ from pathlib import Path
 
 from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from hmi.web.roles import Role
 from station.atomic_file import write_atomically
@@ -155,7 +155,7 @@ class UserStore:
             return _File.model_validate(content).people
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError, ValidationError) as error:
+        except (OSError, ValueError) as error:
             self.broken = (
                 f"{self.path} cannot be read: {error}; put a good copy in its place, or remove it, and start the pages "
                 "again: without it the first person at the panel chooses a new administrator's PIN"

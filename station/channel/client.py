@@ -146,4 +146,4 @@ class ChannelClient:
 async def _next_event(monitor: zmq.asyncio.Socket) -> int:
     """Return the number of the monitor's next event."""
     message = await monitor.recv_multipart()
-    return int(parse_monitor_message(message)["event"])
+    return parse_monitor_message(message)["event"]

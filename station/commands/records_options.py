@@ -96,7 +96,7 @@ def _with_options(
 ) -> Callable[..., Any]:
     """Name and document an option reader as its command, and put these options before the command's own."""
     gathered.__name__, gathered.__doc__ = command.__name__, command.__doc__
-    gathered.__click_params__ = getattr(command, "__click_params__", [])  # type: ignore[attr-defined] (click's own)
+    gathered.__click_params__ = getattr(command, "__click_params__", [])  # pyrefly: ignore[missing-attribute] (click's own)
     for option in reversed(options):
         gathered = option(gathered)
     return gathered

@@ -28,7 +28,7 @@ def service(config: Path | None, style: str) -> None:
 
     At SIGTERM the running inspection ends with its outcome, and the jaws open; then the exit code is 0.
     """
-    configure_logging("station", style)  # type: ignore[arg-type] (click has checked it)
+    configure_logging("station", style)  # pyrefly: ignore[bad-argument-type] (click has checked it)
     configuration, broken = load_or_last_good(config)
     asyncio.run(_run(configuration, broken))
 

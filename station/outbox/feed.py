@@ -88,7 +88,7 @@ def read_batch(folder: Path, station: str, after: int, limit: int = LARGEST_BATC
             wanted = {row: entry for (of, row), entry in first.items() if of == kind}
             rows = read(connection, list(wanted))
             told += [
-                Event(wanted[row], kind, {"station": station, "origin": lineage[0].id, "entry": wanted[row], **data})  # type: ignore[arg-type]
+                Event(wanted[row], kind, {"station": station, "origin": lineage[0].id, "entry": wanted[row], **data})
                 for row, data in rows.items()
             ]
         told.sort(key=lambda event: event.entry)

@@ -28,10 +28,8 @@ def read_revisions(connection: Connection, name: str = "") -> list[Revision]:
     query = select(recipe_revisions).order_by(recipe_revisions.c.name, recipe_revisions.c.revision)
     if name:
         query = query.where(recipe_revisions.c.name == name)
-    return [
-        Revision(**{**row, "status": Status(row["status"]), "origin": Origin(row["origin"])})
-        for row in connection.execute(query).mappings()
-    ]
+    rows = [dict[str, Any](row) for row in connection.execute(query).mappings()]
+    return [Revision(**(row | {"status": Status(row["status"]), "origin": Origin(row["origin"])})) for row in rows]
 
 
 def submit(connection: Connection, text: str, recipe: Recipe, person: Person) -> Revision:

@@ -65,7 +65,7 @@ def read_open(connection: Connection) -> OpenInspections:
 def read_alarms(connection: Connection) -> tuple[AlarmRow, ...]:
     """Read the alarms that were saved last, by their ids."""
     rows = connection.execute(select(alarms).order_by(alarms.c.id))
-    return tuple(AlarmRow(**row) for row in rows.mappings())
+    return tuple(AlarmRow(**dict[str, Any](row)) for row in rows.mappings())
 
 
 def read_alarm_log(connection: Connection, limit: int) -> tuple[AlarmEntry, ...]:

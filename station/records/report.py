@@ -142,7 +142,9 @@ def _judged(judged: InspectionRecord) -> Iterator[str]:
 
 
 def _curve_rows(curve: Sequence[CurvePoint]) -> list[tuple[str, ...]]:
-    rows = [("step", "width mm", "closing mm", "area mm²", "px", "changed mm²", "px", "confidence", "flags")]
+    rows: list[tuple[str, ...]] = [
+        ("step", "width mm", "closing mm", "area mm²", "px", "changed mm²", "px", "confidence", "flags")
+    ]
     rows += [
         (
             str(point.step),

@@ -110,7 +110,7 @@ def conclude(
         {
             "number": sequence,
             "judged": record.outcome,
-            "reasons": [str(reason) for reason in record.reasons],
+            "reasons": list(record.reasons),
             "explanation": [to_stored(message) for message in record.explanation],
             "late": record.late,
             "partial": record.partial,
@@ -283,7 +283,7 @@ def _judged(begun: Mapping[str, Any], record: InspectionRecord) -> Outcome:
         late=record.late,
         partial=record.partial,
         area_mm2=None if record.area_mm2 is None else float(record.area_mm2),
-        area_px=None if record.area_px is None else int(record.area_px),
+        area_px=record.area_px,
         closing_mm=None if record.closing_mm is None else float(record.closing_mm),
         confidence=None if record.confidence is None else float(record.confidence),
         ended_utc_ms=record.ended_utc_ms,

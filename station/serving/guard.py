@@ -170,11 +170,12 @@ class GuardedListener(socket.socket):
                 await app(scope, receive, send)
                 return
             client = tuple(scope["client"] or ())
-            connection = next((each for each in self.places if each.client == client), None)
-            if connection is None:  # displaced, or overdue, while its request came
+            found = next((each for each in self.places if each.client == client), None)
+            if found is None:  # displaced, or overdue, while its request came
                 await PlainTextResponse("too many connections", 503, {"connection": "close"})(scope, receive, send)
                 return
 
+            connection = found
             connection.known = self._known(connection.holder)
             if not _has_body(scope):
                 connection.begin()

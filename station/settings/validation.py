@@ -77,7 +77,7 @@ def _problems(
     if isinstance(cause, FieldError):
         return [Problem(*locate(path + inner), expected) for inner, expected in cause.parts]
     if kind == "extra_forbidden" and path in earlier:
-        return [Problem(*locate(path), messages.EARLIER_SETTING(name=str(path[-1])))]
+        return [Problem(*locate(path), messages.EARLIER_SETTING(name=path[-1]))]
     if kind == "extra_forbidden":
         return [Problem(*locate(path), _unknown(str(path[-1]), names(root, path[:-1])))]
     if isinstance(cause, WantedError):

@@ -106,7 +106,7 @@ def _refusal(error: Exception, text: str) -> tuple[int, Message]:
 class _Reader(yaml.SafeLoader):
     """PyYAML's nodes as plain values, with their lines and problems."""
 
-    NON_PRINTABLE = re.compile("[^\t\n\r\x20-\x7e\xa0-\u2027\u202a-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+    NON_PRINTABLE = re.compile("[^\t\n\r\x20-\x7e\xa0-\u2027\u202a-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # pyrefly: ignore[bad-override] (final)
     """As PyYAML's, with the characters that break lines in YAML 1.1 only."""
 
     def __init__(self, text: str) -> None:

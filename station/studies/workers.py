@@ -92,7 +92,7 @@ def on_cluster(tasks: Sequence[Task], address: str) -> Iterator[SampleResult]:
         ) from error
     try:
         client = distributed.Client(address, timeout=_CLUSTER_TIMEOUT_S)
-    except (OSError, ValueError, TypeError, TimeoutError) as error:
+    except (OSError, ValueError, TypeError) as error:
         raise BadInputError(
             f"--scheduler {address}: no Dask scheduler answers there within {_CLUSTER_TIMEOUT_S} s; expected an "
             "address such as tcp://10.0.0.5:8786: is `dask scheduler` running, and no firewall between?"

@@ -89,10 +89,10 @@ def brightest_cluster(denoised: Image, parameters: PaperParameters) -> Mask:
     cv2.setRNGSeed(parameters.seed)
     criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, _KMEANS_ITERATIONS, _KMEANS_EPSILON)
     labels: npt.NDArray[np.int32]
-    _, labels, centres = cv2.kmeans(
+    _, labels, centres = cv2.kmeans(  # pyrefly: ignore[no-matching-overload] (OpenCV's stub forbids its own default)
         pixels,
         parameters.clusters,
-        None,  # pyright: ignore[reportArgumentType, reportCallIssue] (OpenCV's stub forbids its own default)
+        None,
         criteria,
         parameters.kmeans_starts,
         cv2.KMEANS_PP_CENTERS,

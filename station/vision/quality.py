@@ -32,6 +32,6 @@ def denoising_quality(noisy: Image, denoised: Image) -> DenoisingQuality:
     if noisy.shape != denoised.shape or noisy.dtype != denoised.dtype:
         raise ValueError(f"cannot compare {noisy.shape} {noisy.dtype} with {denoised.shape} {denoised.dtype}")
     mse = float(np.mean(np.square(noisy.astype(np.float32) - denoised)))
-    ssim = cv2.quality.QualitySSIM_compute(noisy, denoised)[0]  # pyright: ignore[reportAttributeAccessIssue] (missing in OpenCV's stub)
+    ssim = cv2.quality.QualitySSIM_compute(noisy, denoised)[0]  # pyrefly: ignore[missing-attribute] (missing in OpenCV's stub)
     psnr_db = cv2.PSNR(noisy, denoised) if mse else float("inf")
     return DenoisingQuality(psnr_db=psnr_db, mse=mse, ssim=sum(ssim[:3]) / 3)

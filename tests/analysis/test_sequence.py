@@ -159,7 +159,7 @@ def by_name(sources: Sequence[Source], order: Sequence[Run]) -> list[str]:
 )
 def test_a_press_ends_where_the_jaws_open(widths, sequence, expected):
     sources = [source(name) for name in "abcde"]
-    table = None if widths is None else dict(zip("abcde", widths, strict=True))
+    table: dict[str, float] | None = None if widths is None else dict(zip("abcde", widths, strict=True))
     assert by_name(sources, runs(sources, table, sequence=sequence)) == expected
 
 
@@ -170,7 +170,7 @@ def test_videos_folders_and_files_are_presses_of_their_own():
     ]  # fmt: skip
     assert by_name(sources, runs(sources, None, sequence=False)) == ["!a", "!B", "!C", "!d", "!?", "EF"]
     assert by_name(sources, runs(sources, None, sequence=True)) == ["ad", "BC", "!?", "EF"]
-    table = dict(zip("aBCdEF", (4, 5, 6, 9, 2, 3), strict=True))
+    table: dict[str, float] = dict(zip("aBCdEF", (4, 5, 6, 9, 2, 3), strict=True))
     assert by_name(sources, runs(sources, table, sequence=False)) == ["da", "CB", "!?", "E", "F"]
 
 

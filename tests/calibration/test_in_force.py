@@ -209,4 +209,4 @@ async def glance(configuration):
 async def beat(client):
     with contextlib.suppress(Exception):
         return await client.request(LINE, StationState, deadline_s=10)
-    return StationState.model_construct(boot="", ready=False, why_not_ready=None)
+    return StationState.model_construct(boot="", ready=False, why_not_ready=None)  # pyrefly: ignore[missing-argument] (only what is read)

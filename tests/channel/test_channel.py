@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from station.channel.client import ChannelClient
 from station.channel.messages import ChannelError, ChannelMessage, DeadlineError, RefusedError, check_endpoint
-from station.channel.server import ChannelServer
+from station.channel.server import ChannelServer, Handlers
 from station.errors import BadInputError, StationError
 
 
@@ -69,7 +69,7 @@ class Peer:
         raise ZeroDivisionError("a bug")
 
     async def serve(self, endpoint: str) -> None:
-        handlers = {Add: self.add, Sleep: self.sleep, Refuse: self.refuse, Break: self.fail}
+        handlers: Handlers = {Add: self.add, Sleep: self.sleep, Refuse: self.refuse, Break: self.fail}
         await ChannelServer(endpoint, handlers).serve()
 
 

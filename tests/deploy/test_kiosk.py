@@ -20,7 +20,7 @@ def kiosk(root: Path) -> Path:
 @pytest.fixture
 def unit(kiosk: Path) -> configparser.ConfigParser:
     parser = configparser.ConfigParser(interpolation=None, strict=False)
-    parser.optionxform = str  # type: ignore[assignment, method-assign]
+    parser.optionxform = str  # pyrefly: ignore[bad-assignment]
     parser.read(kiosk / "fruit-station-kiosk.service")
     return parser
 

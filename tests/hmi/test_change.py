@@ -27,7 +27,7 @@ def state(check_due):
         began_utc_ms=1, ended_utc_ms=2,
     )  # fmt: skip
     recipe = RecipeNames(number=2, name="blueberry", title="Blueberry", revision="1")
-    return PanelState.model_construct(
+    return PanelState.model_construct(  # pyrefly: ignore[missing-argument] (what the page reads)
         boot="1", utc_ms=1, state="idle", activity=verbatim(""), packml_state=None, mode=1, ready=not check_due,
         why_not_ready=check_due, busy=False, needs_person=False, stopping=False, simulated=False, recipe=recipe,
         check_due=check_due, alarms=(), devices=(), orders=(order,), may=(), recoveries=(),

@@ -34,7 +34,7 @@ class Visitor:
         self._url, self._context, self._cookie = urlsplit(address), context, ""
 
     def ask(self, method: str, path: str, **form: str) -> tuple[int, str]:
-        host, port = str(self._url.hostname), int(self._url.port or 0)
+        host, port = str(self._url.hostname), self._url.port or 0
         if self._context is None:
             line = http.client.HTTPConnection(host, port, timeout=PATIENCE_S)
         else:
@@ -68,7 +68,7 @@ def crowd() -> Iterator[Callable[..., list[socket.socket]]]:
         ) -> list[Any]:
             clients = []
             for _ in range(count):
-                place = ("127.0.0.1", int(urlsplit(address).port or 0))
+                place = ("127.0.0.1", urlsplit(address).port or 0)
                 client = socket.create_connection(place, PATIENCE_S, (source, 0))
                 stack.callback(client.close)
                 with contextlib.suppress(OSError):  # it may be put out again by now

@@ -2,6 +2,7 @@
 
 import html
 import re
+from typing import Any
 
 import pytest
 
@@ -30,7 +31,7 @@ DONE_SETUP = FRESH_SETUP.model_copy(
 
 def state(setup=FRESH_SETUP, fault: Message | None = AWAY, recipe=None, devices=("camera", "gripper", "arm"), **more):
     """A fresh station; nothing answers."""
-    values = {
+    values: dict[str, Any] = {
         "boot": "1", "utc_ms": 1, "state": "idle", "activity": verbatim(""), "packml_state": None, "mode": 1,
         "ready": False, "why_not_ready": readiness.NOT_PRODUCTION(), "busy": False, "needs_person": False,
         "stopping": False, "simulated": False, "recipe": recipe, "check_due": None, "alarms": (), "orders": (),

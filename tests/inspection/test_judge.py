@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -47,7 +48,7 @@ def point(closing_mm: float, area_mm2: float, *flags: Flag, confidence: float | 
     return Measured(closing_mm, area_mm2, px, confidence, frozenset(flags))
 
 
-def pressed(growth: float, to_mm: int = 12, **changes: object) -> Press:
+def pressed(growth: float, to_mm: int = 12, **changes: Any) -> Press:
     """A strawberry whose area grows evenly, until the early stop ends it."""
     points: list[Measured] = []
     for closing in range(to_mm + 1):
@@ -57,7 +58,7 @@ def pressed(growth: float, to_mm: int = 12, **changes: object) -> Press:
     return replace(Press(35.0, 1.0, tuple(points)), **changes)
 
 
-def spoilt(press: Press, closing_mm: float, *flags: Flag, **changes: object) -> Press:
+def spoilt(press: Press, closing_mm: float, *flags: Flag, **changes: Any) -> Press:
     """The press with one of its points changed."""
     return replace(
         press,
@@ -495,7 +496,7 @@ def test_an_area_as_large_as_the_least_with_its_uncertainty_is_pressed_on():
 DECIDING = STRAWBERRY.model_copy(update={"steps": STRAWBERRY.steps.model_copy(update={"stop_when_decided": True})})
 
 
-def steps_made(growth: float, *flags: Flag, recipe: Recipe = DECIDING, **changes: object) -> Press:
+def steps_made(growth: float, *flags: Flag, recipe: Recipe = DECIDING, **changes: Any) -> Press:
     """A strawberry pressed by `recipe`, its area growing evenly, until nothing more is to be learnt."""
     press = replace(Press(35.0, 0.4, ()), **changes)
     for closing in range(13):
@@ -548,7 +549,7 @@ def test_an_onset_that_uncertain_steps_hide_gets_one_more_step_to_show_itself():
 
 
 def test_a_doubtful_onset_does_not_press_a_fruit_on_to_the_early_stop():
-    def late(to_mm: int, **second: object) -> Press:
+    def late(to_mm: int, **second: Any) -> Press:
         points = [point(float(c), max(2.0, 30.0 * (c - 1.5))) for c in range(to_mm + 1)]
         points[2] = replace(points[2], **second)
         return Press(35.0, 0.4, tuple(points))

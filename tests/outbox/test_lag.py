@@ -3,6 +3,7 @@
 import asyncio
 import json
 import time
+from typing import Any
 
 import pytest
 
@@ -96,7 +97,7 @@ def test_what_is_behind_by_its_age_or_for_an_unknown_time_is_said_and_what_is_in
 
     def trouble(**values):
         usual = {"connected": False, "told": 0, "refused": 0, "waiting": 0, "oldest_utc_ms": None, "error": AWAY}
-        write_status(outbox_folder(home), {"postgresql": DestinationStatus(**{**usual, **values})})
+        write_status(outbox_folder(home), {"postgresql": DestinationStatus(**dict[str, Any]({**usual, **values}))})
         return of.alarm_detail()
 
     assert of.alarm_detail() is None, "it has just begun"

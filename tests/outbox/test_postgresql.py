@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import psycopg
 import pytest
@@ -31,9 +32,10 @@ LIMIT_S = 90.0
 
 
 def settings(server, **changes):
-    return OutboxPostgresqlSettings(
-        **{"enabled": True, "host": str(server.folder), "port": 5432, "user": "fruit", "tls": "disable", **changes}
-    )
+    usual: dict[str, Any] = {
+        "enabled": True, "host": str(server.folder), "port": 5432, "user": "fruit", "tls": "disable"
+    }  # fmt: skip
+    return OutboxPostgresqlSettings(**(usual | changes))
 
 
 def rows(server, query, *values):

@@ -23,7 +23,7 @@ from station.channel.line import (
     Resume,
     StationState,
 )
-from station.channel.server import ChannelServer
+from station.channel.server import ChannelServer, Handlers
 from station.errors import BadInputError
 
 PATIENCE_S = 30.0
@@ -68,7 +68,7 @@ class ScriptedStation:
         self.boots += 1
         if self.running is not None:
             self.finish("NO_RESULT", Reason.STATION_LOST)
-        handlers = {
+        handlers: Handlers = {
             Begin: self._begin,
             AwaitOutcome: self._await,
             Published: self._published,

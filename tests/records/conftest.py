@@ -37,7 +37,7 @@ def opened(folder: Path) -> Open:
     async def open_them(where: Path = folder, **settings: Any) -> AsyncIterator[Records]:
         nonlocal starts
         starts += 1
-        chosen = RecordsSettings(**{"deadline_s": 20.0, "free_reserve_mb": 1, **settings})
+        chosen = RecordsSettings(**dict[str, Any]({"deadline_s": 20.0, "free_reserve_mb": 1, **settings}))
         records = await Records.open(where, chosen, f"boot-{starts}")
         try:
             yield records

@@ -3,6 +3,7 @@
 import asyncio
 import sqlite3
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -87,12 +88,14 @@ def test_what_the_plc_was_told_overrules_what_was_judged(opened, scenario, trigg
             sequence = await records.begin(trigger)
             judged = None if told_first else await records.conclude(sequence, passed)
             told = Outcome(
-                **{
-                    **(judged.model_dump() if judged else _bare(sequence)),
-                    "outcome": "NO_RESULT",
-                    "reasons": (Reason.LATE,),
-                    "late": True,
-                }
+                **dict[str, Any](
+                    {
+                        **(judged.model_dump() if judged else _bare(sequence)),
+                        "outcome": "NO_RESULT",
+                        "reasons": (Reason.LATE,),
+                        "late": True,
+                    }
+                )
             )
             assert await records.published(told)
             if told_first:
@@ -105,7 +108,7 @@ def test_what_the_plc_was_told_overrules_what_was_judged(opened, scenario, trigg
     scenario(steps)
 
 
-def _bare(sequence: int) -> dict[str, object]:
+def _bare(sequence: int) -> dict[str, Any]:
     return {
         "sequence": sequence,
         "trigger_id": 7,
@@ -126,7 +129,8 @@ def _bare(sequence: int) -> dict[str, object]:
 
 
 def _told(sequence: int) -> Outcome:
-    return Outcome(**{**_bare(sequence), "outcome": "NO_RESULT", "reasons": (Reason.STATION_LOST,), "late": False})
+    told: dict[str, Any] = {"outcome": "NO_RESULT", "reasons": (Reason.STATION_LOST,), "late": False}
+    return Outcome(**(_bare(sequence) | told))
 
 
 def test_a_restart_ends_what_was_not_surely_delivered(opened, scenario, trigger, passed, failed):
@@ -155,7 +159,7 @@ def test_a_restart_ends_what_was_not_surely_delivered(opened, scenario, trigger,
             assert (await records.inspection(judged)).judged == passed
             assert (await records.inspection(running)).judged is None
             # the interface outlived the station, and had shown the outcome just before: that stands
-            shown = Outcome(**{**was_open.ended[1].model_dump(), "outcome": "PASS", "reasons": ()})
+            shown = Outcome(**dict[str, Any]({**was_open.ended[1].model_dump(), "outcome": "PASS", "reasons": ()}))
             assert await records.published(shown)
             assert (await records.inspection(judged)).standing == shown
 

@@ -391,7 +391,7 @@ def test_a_good_recipe_is_read_and_cannot_be_changed(small, write):
     assert (recipe.name, recipe.steps.travel_mm, recipe.segmentation.method) == ("cherry", 8.0, "robust")
     assert [threshold.area_mm2 for threshold in recipe.damage.area] == [100.0, 150.0]
     with pytest.raises(ValueError, match="frozen"):
-        recipe.name = "other"
+        recipe.name = "other"  # pyrefly: ignore[read-only] (as is tested)
 
 
 def test_steps_that_are_no_binary_fractions_end_where_a_person_says(small, write):

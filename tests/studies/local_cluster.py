@@ -11,9 +11,9 @@ def main() -> None:
         n_workers=2,
         threads_per_worker=1,
         processes=True,
-        dashboard_address=None,  # pyright: ignore[reportArgumentType] (None is no dashboard)
+        dashboard_address=None,
     ) as cluster:
-        address = cluster.scheduler_address  # pyright: ignore[reportAttributeAccessIssue] (known at run time)
+        address = cluster.scheduler_address
         sys.stdout.write(f"{address}\n")
         sys.stdout.flush()
         sys.stdin.read()

@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import sys
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
@@ -60,7 +60,7 @@ class Bench:
         lines = (self.folder / "log").read_text().splitlines()
         return [int(line.split()[2]) for line in lines if line.startswith(f"start {name} ")]
 
-    def run(self, programs: list[Program], play: Callable[[Supervisor, asyncio.Event], object]) -> None:
+    def run(self, programs: list[Program], play: Callable[[Supervisor, asyncio.Event], Awaitable[object]]) -> None:
         """Supervise until `play`, which begins when all are ready, sets the event or the supervisor gives up."""
 
         async def supervise() -> None:
@@ -70,7 +70,7 @@ class Bench:
             await asyncio.wait([running, waiting], return_when=asyncio.FIRST_COMPLETED)
             if ready.is_set():
                 self.ready = True
-                await play(supervisor, ended)  # pyright: ignore[reportGeneralTypeIssues]
+                await play(supervisor, ended)
             waiting.cancel()
             await running
 

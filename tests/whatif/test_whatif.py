@@ -203,7 +203,7 @@ def test_a_process_that_is_killed_is_told_with_how_to_go_on():
         return future
 
     with pytest.raises(StationError, check=lambda error: error.message == messages.PROCESS_ENDED()):
-        list(runner._flow([None, None], lost, 1))  # type: ignore[list-item] (no part is looked at)
+        list(runner._flow([None, None], lost, 1))  # pyrefly: ignore[bad-argument-type] (no part is looked at)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 
 from typing import Any
 
-from deploy.grafana.boards.panel import board, chosen, sql
+from deploy.grafana.boards.panel import Panel, board, chosen, sql
 
 BETWEEN = "hour BETWEEN date_trunc('hour', $__timeFrom()::timestamptz) AND $__timeTo()::timestamptz"
 HERE = f"{BETWEEN} AND station IN (${{station:sqlstring}}) AND fruit IN (${{fruit:sqlstring}}) AND inspections > 0"
@@ -97,5 +97,10 @@ def dashboard() -> Any:
                several=True),
     )  # fmt: skip
     about = "Whose fruit is good, and what changes over the season?"
-    rows = {"Lots": LOTS, "Growers": GROWERS, "Trends": TRENDS, "The stations' records": REPLICATION}
+    rows: dict[str, tuple[Panel, ...]] = {
+        "Lots": LOTS,
+        "Growers": GROWERS,
+        "Trends": TRENDS,
+        "The stations' records": REPLICATION,
+    }
     return board("fruit-quality", "Quality", about, variables, rows)

@@ -10,7 +10,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import can
 import canopen
@@ -80,7 +80,9 @@ def open_bus(settings: CanSettings) -> can.BusABC:
     Raises:
         InterfaceError: it does not exist, or cannot be opened on this machine.
     """
-    options = {"port": settings.port, "hop_limit": 0, "fd": False} if settings.interface == "udp_multicast" else {}
+    options: dict[str, Any] = (
+        {"port": settings.port, "hop_limit": 0, "fd": False} if settings.interface == "udp_multicast" else {}
+    )
     try:
         return can.Bus(interface=settings.interface, channel=settings.channel, ignore_config=True, **options)
     except (can.CanError, OSError) as error:

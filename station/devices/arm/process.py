@@ -206,7 +206,7 @@ class UrRtdeProcess:
             done = await asyncio.get_running_loop().run_in_executor(self._commander, call)
         except Exception as error:  # noqa: BLE001 (any error of ur-rtde is an answer)
             return Outcome(done=False, output=message_of(error))
-        return Outcome(done=bool(done))
+        return Outcome(done=done)
 
 
 def die_with(parent: int) -> None:

@@ -127,7 +127,7 @@ def set_mode(capture: Capture, serial: str) -> None:
 
 def open_v4l2(node: str) -> Capture:
     """Open a node with OpenCV."""
-    return cv2.VideoCapture(node, cv2.CAP_V4L2)  # pyright: ignore[reportReturnType] (OpenCV's stub has MatLike)
+    return cv2.VideoCapture(node, cv2.CAP_V4L2)  # pyrefly: ignore[bad-return] (OpenCV's stub has MatLike)
 
 
 class DigitCamera:

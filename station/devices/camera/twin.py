@@ -125,7 +125,7 @@ class TwinCamera:
                 await self._listen()
             except CameraProtocolError as error:
                 self._feed.trouble = error.message
-            except (OSError, EOFError, TimeoutError) as error:
+            except (OSError, EOFError) as error:
                 self._feed.trouble = _describe(error)
             await asyncio.sleep(_RETRY_S)
 
@@ -156,7 +156,7 @@ class TwinCamera:
                     yield reader
                 finally:
                     await _close(writer)
-        except (OSError, EOFError, TimeoutError) as error:
+        except (OSError, EOFError) as error:
             raise CameraError(failed(address=self._where, reason=_describe(error))) from error
 
     async def _ask(self, request: dict[str, Any]) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:

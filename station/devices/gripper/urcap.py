@@ -102,7 +102,7 @@ class UrcapLink:
 
     async def _ask(self, request: bytes) -> bytes:
         reader, writer = await self._connected()
-        answer = b""
+        answer: bytes = b""
         try:
             async with asyncio.timeout(self._answer_timeout_s):
                 writer.write(request)

@@ -154,12 +154,12 @@ class Metrics(Collector):
         """Return the value if the label may have it, else `other`: no caller can make the number of series grow."""
         allowed = LABELS[name]
         if isinstance(allowed, frozenset):
-            return str(value) if value in allowed else OTHER
+            return value if value in allowed else OTHER
         taken = self._values.setdefault(name, set())
         if value not in taken and len(taken) >= allowed:
             return OTHER
-        taken.add(str(value))
-        return str(value)
+        taken.add(value)
+        return value
 
     def collect(self) -> Iterator[Metric]:
         """Yield the metrics that are read at the scrape."""

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from pydantic import ValidationError
-
 from station.errors import StationError
 from station.messages import recipes as messages
 from station.messages.message import Message, message_of
@@ -143,7 +141,7 @@ class ActiveRecipes:
             told = json.loads(data or b"null")
             active = ActiveRecipe.of(Recipe.model_validate_json(json.dumps(told["values"])), told["revision"])
             lot, sha256 = told["lot"], told["sha256"]
-        except (ValueError, TypeError, KeyError, ValidationError):
+        except (ValueError, TypeError, KeyError):
             return None
         try:
             current = self.current(active)
@@ -202,7 +200,7 @@ class ActiveRecipes:
             try:
                 told = json.loads(self._state_files.read(f"{_CONTROLS}/{name}.json") or b"null")
                 found[name] = Control(Recipe.model_validate_json(json.dumps(told["values"])), int(told["revision"]))
-            except (ValueError, TypeError, KeyError, ValidationError):
+            except (ValueError, TypeError, KeyError):
                 continue  # of another form of the program
         return found
 

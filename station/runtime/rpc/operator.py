@@ -134,7 +134,7 @@ class PanelServer:
             check_due=self._devices.calibration.refusal(),
             alarms=self._alarms.active(),
             devices=tuple(
-                DeviceView(name=name, fault=watch.fault and message_of(watch.fault), age_s=watch.age_s)
+                DeviceView(name=name, fault=message_of(watch.fault) if watch.fault else None, age_s=watch.age_s)
                 for name, watch in self._devices.monitors.items()
             ),
             orders=self._operator_commands.recent,

@@ -47,7 +47,7 @@ class LoopNetwork(canopen.Network):
         Raises:
             OSError: it cannot be had.
         """
-        options = (
+        options: dict[str, Any] = (
             {"port": self._settings.port, "hop_limit": 0, "fd": False}
             if self._settings.interface == "udp_multicast"
             else {}

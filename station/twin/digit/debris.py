@@ -57,7 +57,7 @@ def moved(specks: list[Speck], generator: np.random.Generator) -> list[Speck]:
                 way = -way
             x, y = round(speck.x + cells * np.cos(way)), round(speck.y + cells * np.sin(way))
             now.append(speck._replace(x=x, y=y))
-    come = int(generator.binomial(len(specks), _LOST))
+    come = generator.binomial(len(specks), _LOST)
     return now + scattered(come, generator)
 
 

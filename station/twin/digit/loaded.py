@@ -60,8 +60,9 @@ class LoadedLight:
             levels_per_mm: of the colour that changes most.
         """
         height, width = SENSOR_SHAPE
-        depth = cv2.resize(dent, (width, height), interpolation=cv2.INTER_LINEAR)
-        return self._shade * (depth * np.float32(levels_per_mm))[..., None]
+        depth = np.asarray(cv2.resize(dent, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
+        levels = (depth * np.float32(levels_per_mm)).astype(np.float32, copy=False)
+        return self._shade * levels[..., None]
 
 
 def band_share(push_mm: float) -> float:

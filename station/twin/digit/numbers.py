@@ -48,4 +48,4 @@ class Fitted:
         with files("station.twin.digit").joinpath(FILE).open("rb") as file, np.load(file) as archive:
             numbers: dict[str, Any] = {name: archive[name].astype(np.float32) for name in archive.files}
         noise = NoiseLevels(**{name: numbers.pop(f"noise_{name}") for name in NoiseLevels.__dataclass_fields__})
-        return cls(**{**numbers, "smoothing_mm": float(numbers["smoothing_mm"]), "noise": noise})
+        return cls(**dict[str, Any]({**numbers, "smoothing_mm": float(numbers["smoothing_mm"]), "noise": noise}))

@@ -6,6 +6,7 @@ emergency stopped. What the real one answers to nonsense is unverified on hardwa
 
 import asyncio
 from dataclasses import fields, replace
+from typing import Any
 
 from station.twin.robotiq.faults import GripperFault
 from station.twin.robotiq.listener import Listener, disturbed
@@ -53,7 +54,7 @@ class UrcapServer(Listener):
         return _NONSENSE
 
     def _set(self, words: list[str]) -> bytes:
-        changes: dict[str, bool | int] = {}
+        changes: dict[str, Any] = {}
         for name, text in zip(words[::2], words[1::2], strict=False):
             field = _WRITABLE.get(name)
             if field is None or not text.isdecimal() or len(text) > _LONGEST_NUMBER or int(text) > _LARGEST[field]:

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Awaitable, Callable
+from typing import Any
 
 import pytest
 
@@ -31,10 +32,10 @@ class SkippingClock:
 class Bench:
     """A controller, its faults and clock, and the driver's settings for it."""
 
-    def __init__(self, host: str, **controller: object) -> None:
+    def __init__(self, host: str, **controller: Any) -> None:
         self.clock = SkippingClock()
         self.faults: FaultBoard = arm_faults()
-        self.controller = UrController(host, self.clock, self.faults, **controller)  # pyright: ignore[reportArgumentType]
+        self.controller = UrController(host, self.clock, self.faults, **controller)
         self.host = host
 
     def forgive_no_silence(self) -> None:
@@ -65,7 +66,7 @@ def host() -> str:
 @pytest.fixture
 def bench() -> Callable[..., contextlib.AbstractAsyncContextManager[Bench]]:
     @contextlib.asynccontextmanager
-    async def running(**controller: object) -> AsyncIterator[Bench]:
+    async def running(**controller: Any) -> AsyncIterator[Bench]:
         made = Bench(fresh_host(), **controller)
         await made.controller.start()
         try:

@@ -114,7 +114,7 @@ def play(wire: str, scenario: Scenario, **settings: Any) -> Any:
     async def whole() -> Any:
         asyncio.get_running_loop().set_exception_handler(lambda _, context: unseen.append(context))
         # Where no limit is to pass, none does on a busy machine either.
-        rig = Rig(wire, GripperSettings(**{"answer_timeout_s": 2.0, "move_margin_s": 5.0, **settings}))
+        rig = Rig(wire, GripperSettings(**dict[str, Any]({"answer_timeout_s": 2.0, "move_margin_s": 5.0, **settings})))
         await rig.start()
         try:
             async with asyncio.timeout(SCENARIO_LIMIT_S):

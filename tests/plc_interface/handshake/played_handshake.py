@@ -12,6 +12,7 @@ from plc_interface.handshake.state import restarted
 from plc_interface.handshake.view import line, view
 from station.channel.line import BeginReply, Open, Outcome, PackmlState, Reason, Refusal, StationState
 from station.settings.plc import HandshakeSettings
+from station.vocabulary import OutcomeName
 
 STEPS = 220
 _BITS = ("enable", "buffer_results", "latch_lot", "offline", "clear_error", "reset_counters")
@@ -141,7 +142,7 @@ class Play:
     def outcome(self, sequence: int, trigger_id: int) -> Outcome:
         """Draw an outcome, seldom one that contradicts itself."""
         rng = self.rng
-        name = rng.choice(("PASS", "PASS", "FAIL", "NO_RESULT"))
+        name: OutcomeName = rng.choice(("PASS", "PASS", "FAIL", "NO_RESULT"))
         known = name != "NO_RESULT"
         return Outcome(
             sequence=sequence,

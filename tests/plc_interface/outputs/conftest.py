@@ -86,7 +86,7 @@ def play(scenario: Scenario, *, first_count: int = 0, start: bool = True, **sett
 
     async def whole() -> Any:
         asyncio.get_running_loop().set_exception_handler(lambda _, context: unseen.append(context))
-        rig = Rig(CanSettings(**{**bus, **PATIENT, **settings}), first_count)
+        rig = Rig(CanSettings(**dict[str, Any]({**bus, **PATIENT, **settings})), first_count)
         await rig.nodes.start()
         if start:
             await rig.io.start()

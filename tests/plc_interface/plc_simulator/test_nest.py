@@ -38,7 +38,9 @@ def test_the_length_is_of_the_fruit_that_the_twin_has_laid(graded, unused_port):
             laid = []
             for _ in range(8):
                 fruit = await nest.arrive()
-                laid.append((fruit, twin.world.fruit))
+                truth = twin.world.fruit
+                assert truth
+                laid.append((fruit, truth))
                 await nest.leave()
             return laid
         finally:

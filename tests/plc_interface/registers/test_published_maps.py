@@ -9,6 +9,7 @@ import math
 import struct
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pymodbus.client import AsyncModbusTcpClient
@@ -84,7 +85,7 @@ class OldProgram:
                 values[row["name"]] = self.value(row, raw[at : at + size])
         return values
 
-    def value(self, row, raw):
+    def value(self, row, raw) -> Any:
         if row["type"] == "text":
             return raw.rstrip(b"\0").decode("ascii")
         (number,) = struct.unpack(">" + FORMATS[row["type"]], raw)

@@ -66,7 +66,8 @@ class GoodClient(threading.Thread):
 
     def __init__(self, wire) -> None:
         super().__init__(name="good client", daemon=True)
-        self.wire, self.answers, self.wrong = wire, 0, None
+        self.wire, self.answers = wire, 0
+        self.wrong: AssertionError | OSError | None = None
         self.enough = threading.Event()
 
     def run(self) -> None:

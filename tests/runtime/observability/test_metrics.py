@@ -2,6 +2,7 @@
 
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import pytest
 from prometheus_client.openmetrics.parser import text_string_to_metric_families as parse_openmetrics
@@ -168,13 +169,18 @@ def test_the_counts_equal_the_records(metrics, scenario, tmp_path, outcome):
         settings = RecordsSettings(deadline_s=20.0, free_reserve_mb=1)
         records = await Records.open(tmp_path, settings, "boot")
         metrics.watch_records(records.status)
-        fields = {key: value for key, value in outcome.model_dump().items() if key in InspectionRecord.__slots__}
+        fields: dict[str, Any] = {
+            key: value for key, value in outcome.model_dump().items() if key in InspectionRecord.__slots__
+        }
         for number in range(6):
             sequence = await records.begin(Trigger(number + 1, 0, "", 5, None, simulated=True))
             reasons = ("no_contact",) if number % 3 else ()
-            record = InspectionRecord(
-                **{**fields, "outcome": "NO_RESULT" if reasons else "PASS", "reasons": reasons, "explanation": ()}
-            )
+            judged: dict[str, Any] = {
+                "outcome": "NO_RESULT" if reasons else "PASS",
+                "reasons": reasons,
+                "explanation": (),
+            }
+            record = InspectionRecord(**(fields | judged))
             told = await records.conclude(sequence, record)
             for _ in range(2):
                 if await records.published(told):

@@ -134,8 +134,12 @@ class LogixBlock:
         for part in inner:
             holder = holder[key]
             (last,) = part.children
-            key = str(last) if part.data == "member" else self._value(last)
-            assert key in holder if part.data == "member" else 0 <= key < len(holder), f"{name} has no {key}"
+            if part.data == "member":
+                key = str(last)
+                assert key in holder, f"{name} has no {key}"
+            else:
+                key = self._value(last)
+                assert 0 <= key < len(holder), f"{name} has no {key}"
         return holder, key
 
     def _store(self, node: Any, value: Any) -> None:

@@ -71,7 +71,8 @@ class Ton:
     """The standard's on-delay timer."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        self._clock, self._since, self.Q = clock, None, False
+        self._clock, self.Q = clock, False
+        self._since: float | None = None
 
     def __call__(self, inputs: dict[str, Any]) -> None:
         if not inputs["IN"]:
