@@ -2,15 +2,18 @@
 
 Run with `./run bench soak [--minutes 60]`: the twin, the station's processes, the line, three panels and two readers,
 PostgreSQL and an MQTT broker, with the images at their quota. Every ten seconds each process's memory, descriptors and
-threads are read, the PLC's latency, the cycle's time, the records' space and what waits in the outbox. Ctrl-C ends it;
-what was sampled until then is written. Writes `docs/soak.md` and `docs/images/soak.svg`.
+threads are read, the PLC's latency, the cycle's time, the records' space and what waits in the outbox; and, for what
+the machine does meanwhile, the latency of the same server with no station behind it, and the time of a fixed piece of
+work. Ctrl-C ends it; what was sampled until then is written. Writes `docs/soak.md` and `docs/images/soak.svg`.
 """
 
 import argparse
 import asyncio
 import contextlib
+import hashlib
 import os
 import signal
+import statistics
 import sys
 import tempfile
 import time
@@ -29,6 +32,8 @@ from station.records.database import FILE_NAME, records_folder
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "soak.md"
 MINUTES = 60.0
 WINDOW_S = 10.0
+_WORK, _WORK_EVERY_S = bytes(1 << 20), 0.2
+"""What is hashed as the fixed piece of work, some milliseconds' worth, and how often."""
 _ARRIVAL_S = 60.0
 """Until PostgreSQL has everything, once the line has ended."""
 
@@ -66,6 +71,25 @@ async def latency(load: Path, port: int, ended: asyncio.Event) -> Latency | None
         await asyncio.gather(asking, ending, return_exceptions=True)
 
 
+async def work_ms(ended: asyncio.Event) -> float:
+    """Return the mean time of a fixed piece of work, done again and again for one window.
+
+    Args:
+        ended: set where the soak is to end.
+    """
+    took_s, until_s = list[float](), time.monotonic() + WINDOW_S
+    while not took_s or (time.monotonic() < until_s and not ended.is_set()):
+        took_s.append(await asyncio.to_thread(_hashed))
+        await asyncio.sleep(_WORK_EVERY_S)
+    return 1000 * statistics.fmean(took_s)
+
+
+def _hashed() -> float:
+    began_s = time.perf_counter()
+    hashlib.sha256(_WORK)
+    return time.perf_counter() - began_s
+
+
 async def soak(minutes: float, run: Run) -> None:
     """Run the cell and sample it.
 
@@ -87,9 +111,12 @@ async def soak(minutes: float, run: Run) -> None:
             while time.monotonic() - began_s < 60 * minutes and not ended.is_set():
                 if cell.running.done():
                     await cell.running
-                figures = await latency(load, cell.site.modbus.port, ended)
-                if figures is not None:
-                    run.samples.append(await asyncio.to_thread(sampled, cell, figures, time.monotonic() - began_s))
+                figures, bare, work = await asyncio.gather(
+                    latency(load, cell.site.modbus.port, ended), latency(load, cell.bare_port, ended), work_ms(ended)
+                )
+                if figures is not None and bare is not None:
+                    at_s = time.monotonic() - began_s
+                    run.samples.append(await asyncio.to_thread(sampled, cell, (figures, bare), work, at_s))
                     print(progress(run.samples[-1]), file=sys.stderr)
             cell.running.cancel()
             await asyncio.gather(cell.running, return_exceptions=True)
@@ -97,19 +124,20 @@ async def soak(minutes: float, run: Run) -> None:
             run.ending = Ending(decided, None if ended.is_set() else await unsent(cell))
 
 
-def sampled(cell: Cell, figures: Latency, at_s: float) -> Sample:
+def sampled(cell: Cell, latencies: tuple[Latency, Latency], work: float, at_s: float) -> Sample:
     """Read everything once.
 
     Args:
         cell: what runs.
-        figures: the PLC's latency in the window that ends now.
+        latencies: the PLC's in the window that ends now, and the bare server's.
+        work: mean time of the fixed piece of work in that window, ms.
         at_s: since the first fruit.
     """
     metrics, records = cell.site.metrics, records_folder(cell.site.home)
     text = scrape(f"http://{metrics.host}:{metrics.port}/metrics")
     found = processes(psutil.Process().children(recursive=True))
     images_mb, database_mb = size_mb(records, "images/**/*.png"), size_mb(records, f"{FILE_NAME}*")
-    return Sample(at_s, found, figures, counts(text), images_mb, database_mb)
+    return Sample(at_s, found, *latencies, work, counts(text), images_mb, database_mb)
 
 
 async def unsent(cell: Cell) -> int:

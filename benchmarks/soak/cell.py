@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import replace
@@ -55,6 +56,8 @@ class Cell(NamedTuple):
 
     site: Configuration
     server: Server
+    bare_port: int
+    """Of a Modbus server of the station's with no station behind it."""
     line: LineSimulator
     running: asyncio.Task[object]
     """The line; ends only by an error."""
@@ -110,6 +113,20 @@ def broker(folder: Path) -> Iterator[int]:
     file.write_text(f"listener {port} {HOST}\nallow_anonymous true\n", encoding="utf-8")
     # A session of its own: Ctrl-C is the soak's, which ends all in their order. So with every process here.
     process = subprocess.Popen([program, "-c", file], stdout=-3, stderr=-3, start_new_session=True)
+    try:
+        wait_for(port)
+        yield port
+    finally:
+        process.kill()
+        process.wait()
+
+
+@contextlib.contextmanager
+def bare_server() -> Iterator[int]:
+    """The PLC's server in a process of its own, with nothing behind it; gives its port."""
+    port = free_port()
+    program = f"import bench_plc; bench_plc.serve_ours({port}, priority=True)"
+    process = subprocess.Popen([sys.executable, "-c", program], cwd=ROOT / "benchmarks", start_new_session=True)
     try:
         wait_for(port)
         yield port
@@ -179,8 +196,9 @@ async def running() -> AsyncIterator[Cell]:
             # Not on this loop, which feeds the supervisor, until the first of them is answered.
             await asyncio.to_thread(looking.__enter__)
             stack.push(looking.__exit__)
+        bare_port = stack.enter_context(bare_server())
         line, task = await stack.enter_async_context(feeding(site, console_port))
-        yield Cell(site, server, line, task)
+        yield Cell(site, server, bare_port, line, task)
 
 
 def prepare(site: Configuration) -> None:

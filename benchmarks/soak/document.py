@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from sorting import tables
 
-from .cell import ACCEPTED_SHARE, BATCH, CLOSING_MM_S, DAMAGED_SHARE, EARLIER, PANELS, QUOTA_MB, READERS
+from .cell import ACCEPTED_SHARE, BATCH, CLOSING_MM_S, DAMAGED_SHARE, EARLIER, KINDS, PANELS, QUOTA_MB, READERS
 from .samples import MARKS, TWIN, ProcessSample, Sample
 from .slopes import CONFIDENCE, Slope, Verdict, slope
 
@@ -111,27 +111,60 @@ def of_process(samples: Sequence[Sample], name: str, what: Callable[[ProcessSamp
     return Series(name, [at_s for at_s, _ in last], [what(process) for _, process in last])
 
 
-def by_fruit(samples: Sequence[Sample], name: str, total: Callable[[Sample], float]) -> Series:
-    """Return a counted time for each fruit, of the windows in which there was one.
+class Timing(NamedTuple):
+    """A time that a line would feel, and a time of the same kind in which the station has no part."""
 
-    Args:
-        samples: of the time of interest.
-        name: of the quantity.
-        total: the time counted until a sample; a restart of the service sets it back, and that window is left out.
+    station: Series
+    machine: Series | None = None
+    """At the same times; None where there is no such thing."""
+
+    @property
+    def judged(self) -> Series:
+        """The station's share of the two, which the machine's speed does not move; in percent of its median."""
+        values = self.station.values
+        if self.machine is not None:
+            values = [ours / bare for ours, bare in zip(values, self.machine.values, strict=True)]
+        middle = statistics.median(values)
+        return self.station._replace(values=[100 * value / middle for value in values])
+
+
+def rounds_of_kinds(samples: Sequence[Sample]) -> list[list[Sample]]:
+    """Return runs of samples in which all kinds came by: each begins with the last one of the run before.
+
+    A kind has its own time, so that a shorter while says more of the kind than of the station. A restart of the service
+    sets its counts back, and begins anew.
     """
-    pairs = [(a, b) for a, b in pairwise(samples) if b.counts.fruit > a.counts.fruit]
-    means = [(total(b) - total(a)) / (b.counts.fruit - a.counts.fruit) for a, b in pairs]
-    return Series(name, [b.at_s for _, b in pairs], means)
+    runs, run = list[list[Sample]](), list(samples[:1])
+    for before, sample in pairwise(samples):
+        run = [*run, sample] if sample.counts.fruit >= before.counts.fruit else [sample]
+        if sample.counts.fruit - run[0].counts.fruit >= BATCH * len(KINDS):
+            runs.append(run)
+            run = [sample]
+    return runs
 
 
-def timings(samples: Sequence[Sample]) -> list[Series]:
-    """Return what a line would feel: the PLC's latency and the cycle's times."""
+def timings(samples: Sequence[Sample]) -> list[Timing]:
+    """Return what a line would feel: the PLC's latency and the cycle's times, of which a fruit's share is taken."""
     at_s = [each.at_s for each in samples]
+    latencies = [
+        Timing(
+            Series(f"PLC's reply, {name}, µs", at_s, [of(each.latency) for each in samples]),
+            Series(f"bare server's reply, {name}, µs", at_s, [of(each.bare) for each in samples]),
+        )
+        for name, of in (("p50", lambda each: each.p50_us), ("p99", lambda each: each.p99_us))
+    ]
+    runs = rounds_of_kinds(samples)
+    ends_s = [run[-1].at_s for run in runs]
+
+    def by_fruit(total: Callable[[Sample], float]) -> list[float]:
+        return [(total(run[-1]) - total(run[0])) / (run[-1].counts.fruit - run[0].counts.fruit) for run in runs]
+
+    work = [statistics.fmean(each.work_ms for each in run[1:]) for run in runs]
+    own, whole = by_fruit(lambda each: 1000 * each.counts.own_s), by_fruit(lambda each: each.counts.whole_s)
     return [
-        Series("PLC's reply, p50, µs", at_s, [each.latency.p50_us for each in samples]),
-        Series("PLC's reply, p99, µs", at_s, [each.latency.p99_us for each in samples]),
-        by_fruit(samples, "cycle's own time, ms", lambda each: 1000 * each.counts.own_s),
-        by_fruit(samples, "trigger to outcome, s", lambda each: each.counts.whole_s),
+        *latencies,
+        Timing(Series("cycle's own time, ms", ends_s, own), Series("fixed piece of work, ms", ends_s, work)),
+        Timing(Series("trigger to outcome, s", ends_s, whole)),
     ]
 
 
@@ -184,22 +217,21 @@ def pieces_table(samples: Sequence[Sample]) -> list[str]:
 
 def timings_table(samples: Sequence[Sample]) -> list[str]:
     """Return the PLC's latency and the cycle's times."""
-    lines = tables.header("", "median", "least, most of a window", f"% an hour ({CONFIDENCE:.0%})", "flat")
+    per_hour = f"% an hour ({CONFIDENCE:.0%})"
+    lines = tables.header("", "median", "least, most of a window", per_hour, f"of its share: {per_hour}", "flat")
     for each in timings(settled(samples)):
-        if not each.values:
-            continue
-        middle = statistics.median(each.values)
-        share = each._replace(values=[100 * value / middle for value in each.values])
-        lines.append(
-            tables.row(
-                each.name,
-                f"{middle:,.4g}",
-                f"{min(each.values):,.4g}, {max(each.values):,.4g}",
-                in_words(share.slope, 1),
-                share.below(100 * MOST_SHARE_PER_HOUR),
-            )
-        )
+        if each.station.values:
+            share = "" if each.machine is None else in_words(each.judged.slope, 1)
+            lines.append(_timing(each.station, share, each.judged.below(100 * MOST_SHARE_PER_HOUR)))
+            if each.machine is not None:
+                lines.append(_timing(each.machine, "", ""))
     return lines
+
+
+def _timing(series: Series, share: str, flat: str) -> str:
+    least_most = f"{min(series.values):,.4g}, {max(series.values):,.4g}"
+    rise = in_words(Timing(series).judged.slope, 1)
+    return tables.row(series.name, f"{statistics.median(series.values):,.4g}", least_most, rise, share, flat)
 
 
 def present(samples: Sequence[Sample]) -> list[str]:
@@ -258,7 +290,11 @@ def page(samples: Sequence[Sample], ending: Ending, minutes: float, trouble: str
     )
     flat = (
         f"Flat is less than {MOST_PIECES_PER_HOUR:g} more in an hour; of latency and times, less than "
-        f"{MOST_SHARE_PER_HOUR:.0%} of the median more. The twin is none of the station's processes."
+        f"{MOST_SHARE_PER_HOUR:.0%} of the median more. The twin is none of the station's processes. A machine that "
+        "others use is faster in one half hour than in the next. So a reply is judged by its share of what the same "
+        "server with no station behind it took for its own in the same window, and the cycle's own time by its share "
+        f"of a fixed piece of work. The times of the cycle are means over some {BATCH * len(KINDS)} fruit, in which "
+        "all kinds come by."
     )
     images = (
         f"- Images on the disk: at most {max(each.images_mb for each in after):.0f} MB after the warm-up; "
@@ -315,8 +351,10 @@ def draw(samples: Sequence[Sample], file: Path) -> None:
         base = of_process(after, name, lambda each: each.unique_mb).values[0]
         _line(memory, every._replace(values=[value - base for value in every.values]), dashed=name == TWIN)
         _line(pieces, of_process(samples, name, lambda each: each.descriptors + each.threads), dashed=name == TWIN)
-    for each in timings(samples)[:2]:
-        _line(latency, each)
+    for timing in timings(samples)[:2]:
+        _line(latency, timing.station)
+        if timing.machine is not None:
+            _line(latency, timing.machine, dashed=True)
     at_s = [each.at_s for each in samples]
     _line(disk, Series("images", at_s, [each.images_mb for each in samples]))
     _line(disk, Series("database", at_s, [each.database_mb for each in samples]))

@@ -63,6 +63,10 @@ class Sample(NamedTuple):
     """Since the first fruit."""
     processes: dict[str, ProcessSample]
     latency: Latency
+    bare: Latency
+    """Of the same server with no station behind it, asked by a client of the same kind in the same window."""
+    work_ms: float
+    """Mean time of a fixed piece of work in that window."""
     counts: StationCounts
     images_mb: float
     """Space of the records' images."""

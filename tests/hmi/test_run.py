@@ -5,6 +5,9 @@ from math import atan, degrees
 
 import pytest
 
+from hmi.run import charts
+from hmi.web.translation import Locale
+from station.vocabulary import Reason
 from tests.chromium import follow
 
 MM_A_PX = 25.4 * 10.1 / (1280**2 + 800**2) ** 0.5
@@ -14,6 +17,21 @@ CAPITALS_PX = """(selector) => [...document.querySelectorAll(selector)].map((eac
   pen.font = `${fontWeight} ${fontSize} ${fontFamily}`;
   return pen.measureText("H").actualBoundingBoxAscent;
 })"""
+WITH_FIGURES = """([reasons, took, bar]) => {
+  const list = document.querySelector(".why"), cycle = document.querySelector(".cycle");
+  document.querySelector(".fruit-words").style.height = "250px";  // two lines of a reason, and the area
+  list.replaceChildren(...reasons.map((reason) => {
+    const item = document.createElement("li"), words = document.createElement("span");
+    words.textContent = reason;
+    item.append(words, Object.assign(document.createElement("b"), {textContent: "10"}));
+    return item;
+  }));
+  cycle.firstElementChild.textContent = took;
+  cycle.insertAdjacentHTML("beforeend", bar);
+  const bottom = (each) => each.getBoundingClientRect().bottom;
+  return [document.documentElement.scrollHeight, bottom(cycle) - bottom(document.querySelector(".run-figures"))];
+}"""
+"""The page's height with other figures, and how far below their card they end."""
 LEAST_ARC_MINUTES = {
     ".outcome b": 20, ".why-not": 20, ".counts b": 20, ".activity-head": 16, ".decided": 16,
 }  # fmt: skip
@@ -38,6 +56,14 @@ def test_the_run_page_is_read_from_one_metre_and_fits_the_panel(ready, people, p
         minutes = 60 * degrees(atan(min(heights_px) * MM_A_PX / 1000))
         assert minutes >= least, f"{selector}: {minutes:.1f} minutes of arc"
     assert shown.page.evaluate("document.documentElement.scrollHeight") <= 800
+    # As beside any fruit of a line that has run for long: the words are as long as this language has them.
+    words = Locale(locale)
+    reasons = sorted((words.own(f"reason.{each}", each) for each in Reason), key=len)[-3:]
+    takt = words.text("run.takt", takt=words.number(15.3, 1))
+    cycle = f"{words.text('run.cycle_time')} {words.number(12.5, 1)} s · {takt}"
+    page_px, below_card_px = shown.page.evaluate(WITH_FIGURES, [reasons, cycle, charts.bar(12.5, 15.3)])
+    assert page_px <= 800
+    assert below_card_px <= 0, "the cycle's time is not to be seen"
 
 
 @pytest.mark.timeout(240)

@@ -53,8 +53,8 @@ def soak(monkeypatch):
     return document, samples
 
 
-def made(samples_module, leak_mb_per_hour=0.0, pid_after=None, windows=360, images_from=30):
-    """An hour's samples of a station whose service grows."""
+def made(samples_module, leak_mb_per_hour=0.0, pid_after=None, windows=360, images_from=30, machine=0.0, station=0.0):
+    """An hour's samples of a station whose service grows, or which gets slower with its machine or by itself."""
 
     def one(number):
         at_s = 10.0 * (number + 1)
@@ -63,9 +63,13 @@ def made(samples_module, leak_mb_per_hour=0.0, pid_after=None, windows=360, imag
         pid = 7 if pid_after is None or number < pid_after else 8
         processes = {name: samples_module.ProcessSample(pid, each, each + 20, 30, 6) for name, each in mb.items()}
         removed = max(0, number - images_from)
-        counts = samples_module.StationCounts(4.0 * number, 0.1 * number, 8.0 * number, 9.0 * number, removed, 0)
-        latency = samples_module.Latency(200 + number % 7, 600 + number % 9, 900)
-        return samples_module.Sample(at_s, processes, latency, counts, 40.0, 9.0)
+        slower, as_begun = 1 + machine * at_s / 3600, 1 + (machine + station) * at_s / 7200
+        ours = slower + station * at_s / 3600
+        own_s, whole_s = 0.1 * number * as_begun, 8.0 * number
+        counts = samples_module.StationCounts(4.0 * number, own_s, whole_s, 9.0 * number, removed, 0)
+        latency = samples_module.Latency((200 + number % 7) * ours, (600 + number % 9) * ours, 900)
+        bare = samples_module.Latency((100 + number % 5) * slower, (300 + number % 4) * slower, 900)
+        return samples_module.Sample(at_s, processes, latency, bare, 2.0 * slower, counts, 40.0, 9.0)
 
     return [one(number) for number in range(windows)]
 
@@ -85,6 +89,16 @@ def test_the_page_tells_a_process_that_grows_from_one_that_does_not(soak):
     assert "Not decided" not in text
     assert "It was to run" not in text
     assert "1436 fruit" in text
+
+
+@pytest.mark.parametrize(("machine", "station", "flat"), [(0.0, 0.0, "yes"), (0.4, 0.0, "yes"), (0.0, 0.4, "no")])
+def test_a_station_that_gets_slower_is_told_from_a_machine_that_does(soak, machine, station, flat):
+    document, samples = soak
+    text = document.page(made(samples, machine=machine, station=station), document.Ending({}, 0), 60, "", 1.0)
+    names = ("PLC's reply, p50, µs", "PLC's reply, p99, µs", "cycle's own time, ms")
+    assert [row(text, name)[0][-1] for name in names] == [flat] * 3
+    assert row(text, "trigger to outcome, s")[0][-1] == "yes"
+    assert all("+0.0" in row(text, name)[0][3] for name in names) == (not machine and not station)
 
 
 @pytest.mark.parametrize("windows", [1, 9, 150])
