@@ -97,7 +97,7 @@ def verify(server: Server, rows: int) -> dict[str, int]:
         "refused": "SELECT count(*) FROM refused",
     }
     with server.connect() as connection:
-        found = {name: connection.execute(query).fetchone() for name, query in questions.items()}  # pyrefly: ignore[no-matching-overload]
+        found = {name: connection.execute(query).fetchone() for name, query in questions.items()}  # pyrefly: ignore[no-matching-overload] (constants above)
     return {name: row[0] for name, row in found.items() if row}
 
 

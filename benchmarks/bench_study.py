@@ -130,7 +130,7 @@ def result_table(studies: dict[tuple[Kind, str], Study]) -> str:
     rows = []
     for kind in FRUITS:
         by_method = {m: summary(first(studies[kind, m], PAPER_SIZE))["results"] for m in ("paper", "robust")}
-        for ours, theirs in zip(by_method["robust"], by_method["paper"], strict=True):  # pyrefly: ignore[bad-argument-type]
+        for ours, theirs in zip(by_method["robust"], by_method["paper"], strict=True):  # pyrefly: ignore[bad-argument-type] (lists, by their name)
             rows.append(
                 [
                     kind,

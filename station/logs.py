@@ -80,7 +80,7 @@ def configure_logging(
     root = logging.getLogger()
     for old in [old for old in root.handlers if getattr(old, "of_the_station", False)]:
         root.removeHandler(old)
-    handler.of_the_station = True  # pyrefly: ignore[missing-attribute]
+    handler.of_the_station = True  # pyrefly: ignore[missing-attribute] (our mark)
     root.addHandler(handler)
     root.setLevel(level)
     for name, least in _LIBRARIES.items():

@@ -249,7 +249,7 @@ def analyze_apart() -> Callable[..., subprocess.CompletedProcess[str]]:
 
     def run(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "station", "analyze", *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=90, check=False, **options)  # pyrefly: ignore[no-matching-overload]
+        return subprocess.run(command, capture_output=True, text=True, timeout=90, check=False, **options)  # pyrefly: ignore[no-matching-overload] (the caller's options)
 
     return run
 

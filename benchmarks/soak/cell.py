@@ -110,26 +110,26 @@ def broker(folder: Path) -> Iterator[int]:
     """
     program = shutil.which("mosquitto") or "/usr/sbin/mosquitto"
     port, file = free_port(), folder / "mosquitto.conf"
-    file.write_text(f"listener {port} {HOST}\nallow_anonymous true\n", encoding="utf-8")
-    # A session of its own: Ctrl-C is the soak's, which ends all in their order. So with every process here.
-    process = subprocess.Popen([program, "-c", file], stdout=-3, stderr=-3, start_new_session=True)
-    try:
-        wait_for(port)
+    file.write_text(f"listener {port} {HOST}\nallow_anonymous true\nlog_dest none\n", encoding="utf-8")
+    with _serving(port, program, "-c", file):
         yield port
-    finally:
-        process.kill()
-        process.wait()
 
 
 @contextlib.contextmanager
 def bare_server() -> Iterator[int]:
     """The PLC's server in a process of its own, with nothing behind it; gives its port."""
     port = free_port()
-    program = f"import bench_plc; bench_plc.serve_ours({port}, priority=True)"
-    process = subprocess.Popen([sys.executable, "-c", program], cwd=ROOT / "benchmarks", start_new_session=True)
+    with _serving(port, sys.executable, "-c", f"import bench_plc; bench_plc.serve_ours({port}, priority=True)"):
+        yield port
+
+
+@contextlib.contextmanager
+def _serving(port: int, *command: str | Path) -> Iterator[None]:
+    # A session of its own: Ctrl-C is the soak's, which ends all in their order. So with every process here.
+    process = subprocess.Popen(command, cwd=ROOT / "benchmarks", stdout=subprocess.DEVNULL, start_new_session=True)
     try:
         wait_for(port)
-        yield port
+        yield
     finally:
         process.kill()
         process.wait()
@@ -188,6 +188,7 @@ async def running() -> AsyncIterator[Cell]:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         server = stack.enter_context(throwaway(bin_folder))
         file, site = configuration(folder, server, stack.enter_context(broker(folder)))
+        bare_port = stack.enter_context(bare_server())
         await asyncio.to_thread(prepare, site)
         console_port = free_port()
         await stack.enter_async_context(supervised(file, site, console_port))
@@ -196,7 +197,6 @@ async def running() -> AsyncIterator[Cell]:
             # Not on this loop, which feeds the supervisor, until the first of them is answered.
             await asyncio.to_thread(looking.__enter__)
             stack.push(looking.__exit__)
-        bare_port = stack.enter_context(bare_server())
         line, task = await stack.enter_async_context(feeding(site, console_port))
         yield Cell(site, server, bare_port, line, task)
 

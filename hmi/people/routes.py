@@ -167,4 +167,4 @@ def _is_ours(address: str) -> bool:
 
 
 async def _note(hmi: Hmi, caller: Caller, what: str, subject: str = "") -> None:
-    await hmi.gateway.note(PersonNoted(person=actor_of(caller), what=what, subject=subject))  # pyrefly: ignore[bad-argument-type]
+    await hmi.gateway.note(PersonNoted(person=actor_of(caller), what=what, subject=subject))  # pyrefly: ignore[bad-argument-type] (the model checks it)

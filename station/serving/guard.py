@@ -175,7 +175,7 @@ class GuardedListener(socket.socket):
                 await PlainTextResponse("too many connections", 503, {"connection": "close"})(scope, receive, send)
                 return
 
-            connection = found
+            connection = found  # never None, also in the functions below
             connection.known = self._known(connection.holder)
             if not _has_body(scope):
                 connection.begin()

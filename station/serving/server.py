@@ -44,7 +44,7 @@ class Server(uvicorn.Server):
             backlog=ADMITTED_AT_ONCE,
             h11_max_incomplete_event_size=16 * 1024,
             timeout_keep_alive=KEEP_ALIVE_S,
-            timeout_graceful_shutdown=CLOSE_S,  # pyrefly: ignore[bad-argument-type]
+            timeout_graceful_shutdown=CLOSE_S,  # pyrefly: ignore[bad-argument-type] (uvicorn's `int`: a part of a second is right too)
             **options,
         )
         super().__init__(config)

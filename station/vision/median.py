@@ -20,6 +20,6 @@ def median_image(images: Sequence[Image]) -> Image:
     ranks = list(images)
     for turn in range(len(ranks)):
         for at in range(turn % 2, len(ranks) - 1, 2):
-            ranks[at], ranks[at + 1] = cv2.min(ranks[at], ranks[at + 1]), cv2.max(ranks[at], ranks[at + 1])  # pyrefly: ignore[unsupported-operation]
+            ranks[at], ranks[at + 1] = cv2.min(ranks[at], ranks[at + 1]), cv2.max(ranks[at], ranks[at + 1])  # pyrefly: ignore[unsupported-operation] (OpenCV's stub: any type)
     lower, upper = ranks[(len(ranks) - 1) // 2], ranks[len(ranks) // 2]
     return lower if lower is upper else np.asarray((lower.astype(np.uint16) + upper) // 2, np.uint8)

@@ -20,7 +20,7 @@ def kiosk(root: Path) -> Path:
 @pytest.fixture
 def unit(kiosk: Path) -> configparser.ConfigParser:
     parser = configparser.ConfigParser(interpolation=None, strict=False)
-    parser.optionxform = str  # pyrefly: ignore[bad-assignment]
+    parser.optionxform = str  # pyrefly: ignore[bad-assignment] (as configparser's page has it)
     parser.read(kiosk / "fruit-station-kiosk.service")
     return parser
 

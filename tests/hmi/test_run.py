@@ -7,6 +7,7 @@ import pytest
 
 from hmi.run import charts
 from hmi.web.translation import Locale
+from station.channel.panel_live import LONGEST_LOT
 from station.vocabulary import Reason
 from tests.chromium import follow
 
@@ -17,7 +18,7 @@ CAPITALS_PX = """(selector) => [...document.querySelectorAll(selector)].map((eac
   pen.font = `${fontWeight} ${fontSize} ${fontFamily}`;
   return pen.measureText("H").actualBoundingBoxAscent;
 })"""
-WITH_FIGURES = """([reasons, took, bar]) => {
+WITH_FIGURES = """([lot, reasons, took, bar]) => {
   const list = document.querySelector(".why"), cycle = document.querySelector(".cycle");
   document.querySelector(".fruit-words").style.height = "250px";  // two lines of a reason, and the area
   list.replaceChildren(...reasons.map((reason) => {
@@ -26,12 +27,18 @@ WITH_FIGURES = """([reasons, took, bar]) => {
     item.append(words, Object.assign(document.createElement("b"), {textContent: "10"}));
     return item;
   }));
+  document.querySelector(".figures-now span b").textContent = lot;
   cycle.firstElementChild.textContent = took;
+  cycle.querySelector("svg")?.remove();
   cycle.insertAdjacentHTML("beforeend", bar);
   const bottom = (each) => each.getBoundingClientRect().bottom;
-  return [document.documentElement.scrollHeight, bottom(cycle) - bottom(document.querySelector(".run-figures"))];
+  return {
+    page: document.documentElement.scrollHeight,
+    belowCard: bottom(cycle) - bottom(document.querySelector(".run-figures")),
+    cut: cycle.scrollHeight - cycle.clientHeight,
+  };
 }"""
-"""The page's height with other figures, and how far below their card they end."""
+"""What other figures do, in px: the page's height, how far below their card they end, what is cut of the time."""
 LEAST_ARC_MINUTES = {
     ".outcome b": 20, ".why-not": 20, ".counts b": 20, ".activity-head": 16, ".decided": 16,
 }  # fmt: skip
@@ -61,9 +68,11 @@ def test_the_run_page_is_read_from_one_metre_and_fits_the_panel(ready, people, p
     reasons = sorted((words.own(f"reason.{each}", each) for each in Reason), key=len)[-3:]
     takt = words.text("run.takt", takt=words.number(15.3, 1))
     cycle = f"{words.text('run.cycle_time')} {words.number(12.5, 1)} s · {takt}"
-    page_px, below_card_px = shown.page.evaluate(WITH_FIGURES, [reasons, cycle, charts.bar(12.5, 15.3)])
-    assert page_px <= 800
-    assert below_card_px <= 0, "the cycle's time is not to be seen"
+    for lot, seen in (("LOT 1", True), ("WEST-" * (LONGEST_LOT // 5), False)):
+        px = shown.page.evaluate(WITH_FIGURES, [lot, reasons, cycle, charts.bar(12.5, 15.3)])
+        assert px["page"] <= 800
+        assert px["belowCard"] <= 0
+        assert px["cut"] <= 0 or not seen, "the cycle's time is not to be seen"
 
 
 @pytest.mark.timeout(240)

@@ -140,5 +140,5 @@ def test_a_count_that_cannot_be_the_fruits_fires_nothing_and_is_a_fault(gated, o
 def test_shots_on_the_disk_that_cannot_be_read_stop_nothing(tmp_path):
     (tmp_path / "shots.json").write_text('{"1": null}')
     settings = CanSettings(enabled=True)
-    assert make_output(settings, tmp_path)._due == {}  # pyrefly: ignore[missing-attribute]
+    assert make_output(settings, tmp_path)._due == {}  # pyrefly: ignore[missing-attribute] (of the real output)
     assert isinstance(make_output(CanSettings(enabled=False), tmp_path), NoOutput)

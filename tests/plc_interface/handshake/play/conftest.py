@@ -25,7 +25,7 @@ def outcome(sequence: int, trigger_id: int, name: str = "PASS", *reasons: Reason
     return Outcome(
         sequence=sequence,
         trigger_id=trigger_id,
-        outcome=name,  # pyrefly: ignore[bad-argument-type]
+        outcome=name,  # pyrefly: ignore[bad-argument-type] (the model checks it)
         reasons=reasons,
         late=False,
         partial=name != "PASS",
@@ -198,7 +198,7 @@ class Laws:
         elif isinstance(event, ev.CommandFailed) and mine and event.number == before.command_request:
             assert (after.command, result) == (Command.FAILED, COMMAND_RESULT.code("timed_out"))
         elif self._rises(event, before, "execute_command"):
-            self._command_given(event.inputs, before, after)  # pyrefly: ignore[missing-attribute]
+            self._command_given(event.inputs, before, after)  # pyrefly: ignore[missing-attribute] (`_rises` has looked)
 
     def _command_given(self, inputs: ev.Inputs, before: State, after: State) -> None:
         new = inputs.command_sequence != before.journal.command_sequence
@@ -266,7 +266,7 @@ class Laws:
         ):
             assert after.toggle != before.toggle
         if self._rises(event, before, "acknowledge") and before.seen is not None:
-            sequence = event.inputs.acknowledged_sequence  # pyrefly: ignore[missing-attribute]
+            sequence = event.inputs.acknowledged_sequence  # pyrefly: ignore[missing-attribute] (`_rises` has looked)
             shown = before.queue[0].sequence if before.queue else 0
             if sequence not in {shown, before.unconfirmed}:
                 assert Fault.WRONG_ACKNOWLEDGEMENT in after.faults

@@ -634,7 +634,7 @@ def test_a_trigger_left_high_with_an_accepted_id_may_be_refused_after_a_start(st
 
 def test_the_handshake_keeps_its_promises_whatever_comes(station_model, laws):
     run_state_machine_as_test(
-        lambda: Handshake(station_model, laws),  # pyrefly: ignore[bad-argument-type]
+        lambda: Handshake(station_model, laws),  # pyrefly: ignore[bad-argument-type] (Hypothesis calls it)
         settings=settings(
             max_examples=settings().max_examples * 4 // 5,
             stateful_step_count=40,
