@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from station.devices.camera.connection import Connection, connect
 from station.devices.camera.feed import FrameFeed
 from station.devices.camera.health import FrameHealth
 from station.devices.camera.interface import (
@@ -36,8 +37,6 @@ from station.settings.camera import CameraSettings
 _LENGTH = struct.Struct(">I")
 _LONGEST_HEADER = 4096
 _LONGEST_SIDE = 4096
-_BUFFER_BYTES = 2**20
-"""Size of a frame: with asyncio's 64 KiB, reading pauses and resumes a dozen times per frame."""
 _SILENCE_S = 2.0
 _OLDEST_S = 1e6
 _RETRY_S = 0.1
@@ -89,8 +88,8 @@ class TwinCamera:
             CameraError: the twin does not answer, or refuses.
         """
         request = {"kind": "leds", "red": leds.red, "green": leds.green, "blue": leds.blue}
-        async with self._asked(request, messages.TWIN_LIGHT_NOT_SET) as reader:
-            answer = await _read_header(reader)
+        async with self._asked(request, messages.TWIN_LIGHT_NOT_SET) as connection:
+            answer = await _read_header(connection)
         if answer.get("kind") != "leds":
             reason = str(answer.get("message"))
             raise CameraError(messages.TWIN_LIGHT_REFUSED(address=self._where, reason=reason))
@@ -104,12 +103,12 @@ class TwinCamera:
         Raises:
             CameraError: the twin does not answer, or the frame is too old.
         """
-        async with self._asked({"kind": "truth", "sequence": sequence}, messages.TWIN_TRUTH_NOT_READ) as reader:
-            answer = await _read_header(reader)
+        async with self._asked({"kind": "truth", "sequence": sequence}, messages.TWIN_TRUTH_NOT_READ) as connection:
+            answer = await _read_header(connection)
             if answer.get("kind") != "truth" or answer.get("bytes") != shape[0] * shape[1]:
                 reason = str(answer.get("message"))
                 raise CameraError(messages.TWIN_NO_TRUTH(address=self._where, reason=reason))
-            pixels = await reader.readexactly(answer["bytes"])
+            pixels = await connection.read(answer["bytes"])
         return np.frombuffer(pixels, np.uint8).reshape(shape[:2])
 
     async def close(self) -> None:
@@ -131,40 +130,39 @@ class TwinCamera:
 
     async def _listen(self) -> None:
         async with asyncio.timeout(_SILENCE_S):
-            reader, writer = await self._ask({"kind": "stream"})
+            connection = await self._ask({"kind": "stream"})
         try:
             last = -1
             while True:
                 async with asyncio.timeout(_SILENCE_S):
-                    header = await _read_header(reader)
+                    header = await _read_header(connection)
                     received_s = time.monotonic()
-                    image, sequence, age_s = await _read_frame(reader, header)
+                    image, sequence, age_s = await _read_frame(connection, header)
                 if sequence <= last:
                     raise CameraProtocolError(messages.WRONG_ORDER(found=str(sequence), before=str(last)))
                 last = sequence
                 self._feed.publish(image, received_s - age_s, sequence=sequence)
         finally:
-            await _close(writer)
+            await connection.close()
 
     @contextlib.asynccontextmanager
-    async def _asked(self, request: dict[str, Any], failed: Definition) -> AsyncIterator[asyncio.StreamReader]:
+    async def _asked(self, request: dict[str, Any], failed: Definition) -> AsyncIterator[Connection]:
         """Ask on a connection of its own; raise `CameraError` with `failed` where that breaks."""
         try:
             async with asyncio.timeout(_SILENCE_S):
-                reader, writer = await self._ask(request)
+                connection = await self._ask(request)
                 try:
-                    yield reader
+                    yield connection
                 finally:
-                    await _close(writer)
+                    await connection.close()
         except (OSError, EOFError) as error:
             raise CameraError(failed(address=self._where, reason=_describe(error))) from error
 
-    async def _ask(self, request: dict[str, Any]) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
-        host, port = self._settings.twin.host, self._settings.twin.port
-        reader, writer = await asyncio.open_connection(host, port, limit=_BUFFER_BYTES)
+    async def _ask(self, request: dict[str, Any]) -> Connection:
+        connection = await connect(self._settings.twin.host, self._settings.twin.port)
         header = json.dumps(request).encode()
-        writer.write(_LENGTH.pack(len(header)) + header)
-        return reader, writer
+        connection.write(_LENGTH.pack(len(header)) + header)
+        return connection
 
 
 def _describe(error: OSError | EOFError) -> Message:
@@ -177,17 +175,11 @@ def _describe(error: OSError | EOFError) -> Message:
     return messages.LINK_FAILED(reason=os.strerror(number) if number > 0 else error.strerror or str(error))
 
 
-async def _close(writer: asyncio.StreamWriter) -> None:
-    writer.close()
-    with contextlib.suppress(OSError):
-        await writer.wait_closed()
-
-
-async def _read_header(reader: asyncio.StreamReader) -> dict[str, Any]:
-    (length,) = _LENGTH.unpack(await reader.readexactly(_LENGTH.size))
+async def _read_header(connection: Connection) -> dict[str, Any]:
+    (length,) = _LENGTH.unpack(await connection.read(_LENGTH.size))
     if length > _LONGEST_HEADER:
         raise CameraProtocolError(messages.LONG_HEADER(found=length, limit=_LONGEST_HEADER))
-    text = await reader.readexactly(length)
+    text = await connection.read(length)
     try:
         header = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -197,7 +189,7 @@ async def _read_header(reader: asyncio.StreamReader) -> dict[str, Any]:
     return header
 
 
-async def _read_frame(reader: asyncio.StreamReader, header: dict[str, Any]) -> tuple[Image, int, float]:
+async def _read_frame(connection: Connection, header: dict[str, Any]) -> tuple[Image, int, float]:
     if header.get("kind") != "frame":
         kind, reason = repr(header.get("kind")), str(header.get("message"))
         raise CameraProtocolError(messages.NO_FRAME_HEADER(kind=kind, reason=reason))
@@ -211,8 +203,9 @@ async def _read_frame(reader: asyncio.StreamReader, header: dict[str, Any]) -> t
     if header.get("bytes") != height * width * 3:
         found = repr(header.get("bytes"))
         raise CameraProtocolError(messages.WRONG_LENGTH(found=found, width=width, height=height))
-    pixels = await reader.readexactly(height * width * 3)
-    return np.frombuffer(pixels, np.uint8).reshape(height, width, 3), sequence, float(age_s)
+    image = np.empty((height, width, 3), np.uint8)
+    await connection.fill(image.data.cast("B"))
+    return image, sequence, float(age_s)
 
 
 def _whole(header: dict[str, Any], key: str) -> int:
