@@ -8,6 +8,7 @@ import pytest
 from hmi.run import charts
 from hmi.web.translation import Locale
 from station.channel.panel_live import LONGEST_LOT
+from station.messages import states
 from station.vocabulary import Reason
 from tests.chromium import follow
 
@@ -43,6 +44,20 @@ WITH_FIGURES = """([lot, change, reasons, took, bar]) => {
   };
 }"""
 """What other figures do, in px: the page's height, how far below their card they end, what is cut of the time."""
+LATCHED = """([why, words]) => {
+  document.querySelector(".fruit-words").style.height = "250px";  // two lines of a reason, and the area
+  document.querySelector(".activity-head + p").textContent = why;
+  const row = document.querySelector(".activity-buttons"), box = (each) => each.getBoundingClientRect();
+  row.replaceChildren(...words.map((word) => {
+    return Object.assign(document.createElement("button"), {className: "button", textContent: word});
+  }));
+  return {
+    page: document.documentElement.scrollHeight,
+    picture: box(document.querySelector(".fruit-picture")).height,
+    rows: new Set([...row.children].map((each) => box(each).top)).size,
+  };
+}"""
+"""What a station that is latched does, in px: the page's height, the picture's; and the rows of its buttons."""
 LEAST_ARC_MINUTES = {
     ".outcome b": 20, ".why-not": 20, ".counts b": 20, ".activity-head": 16, ".decided": 16,
 }  # fmt: skip
@@ -77,6 +92,23 @@ def test_the_run_page_is_read_from_one_metre_and_fits_the_panel(ready, people, p
         assert px["page"] <= 800
         assert px["belowCard"] <= 0
         assert px["cut"] <= 0 or change, "the cycle's time is not to be seen"
+
+
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize("locale", ["en", "de", "es"])
+def test_a_latched_station_says_what_to_do_beside_the_last_fruit(ready, people, panel, locale):
+    """By the longest that it says, in the place of what it says now."""
+    ready.end(ready.begin())
+    shown = panel(locale=locale)
+    shown.log_in("admin", "482915")
+    shown.open("/")
+    shown.page.locator(".fruit-picture").wait_for()
+    words = Locale(locale)
+    buttons = [words.text("run.recover.protective-stop"), words.text("run.confirm_start")]
+    px = shown.page.evaluate(LATCHED, [words.sentence(states.LATCHED()), buttons])
+    assert px["page"] <= 800
+    assert px["picture"] >= 48
+    assert px["rows"] == 1
 
 
 @pytest.mark.timeout(240)
