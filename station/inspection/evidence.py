@@ -69,6 +69,7 @@ class Evidence:
         recipe = self._recipe = limits.recipe
         named_mm = [threshold.closing_mm for threshold in recipe.damage.area]
         self.points = _in_order([_at(point, named_mm) for point in press.points])
+        self._budgets: dict[float, Budget] = {}
 
     @property
     def reached_mm(self) -> float:
@@ -136,7 +137,9 @@ class Evidence:
 
     def budget_at(self, closing_mm: float) -> Budget:
         """What the uncertainty of an area at a closing above 0 is made of."""
-        return budget_at(closing_mm, self._press, self._limits)
+        if closing_mm not in self._budgets:  # each is asked for by all that is judged of one closing
+            self._budgets[closing_mm] = budget_at(closing_mm, self._press, self._limits)
+        return self._budgets[closing_mm]
 
     def _with_uncertainty(self, closing_mm: float, area_mm2: float, scatter_mm2: float) -> tuple[float, float]:
         return area_mm2, max(area_mm2 * self.budget_at(closing_mm).expanded, scatter_mm2)
