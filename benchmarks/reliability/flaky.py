@@ -13,12 +13,12 @@ _CLOCK = re.compile(
 
 
 class Round(TypedDict):
-    """One run of all the tests."""
+    """One run of each test."""
 
     date: str
     commit: str
     seed: int
-    """Of the order."""
+    """Of the order, which rounds played together share."""
     tests: int
     failed: list[str]
     minutes: float
