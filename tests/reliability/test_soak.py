@@ -53,13 +53,26 @@ def soak(monkeypatch):
     return document, samples
 
 
-def made(samples_module, leak_mb_per_hour=0.0, pid_after=None, windows=360, images_from=30, machine=0.0, station=0.0):
-    """An hour's samples of a station whose service grows, or which gets slower with its machine or by itself."""
+def made(
+    samples_module,
+    leak_mb_per_hour=0.0,
+    pid_after=None,
+    windows=360,
+    images_from=30,
+    machine=0.0,
+    station=0.0,
+    returns=False,
+):
+    """An hour's samples of a station whose service grows, or which gets slower with its machine or by itself.
+
+    With `returns`, samples lie within the refilling of a heap, whose freed memory is returned, ever nearer to its end.
+    """
 
     def one(number):
         at_s = 10.0 * (number + 1)
         noise = 0.05 * (number * 7 % 5)
-        mb = {"service": 160 + noise + leak_mb_per_hour * at_s / 3600, "plc": 42.8}
+        low = 8 * (1 - number / windows) * (number * 7 % 12) / 12 if returns else 0.0
+        mb = {"service": 160 - low + noise + leak_mb_per_hour * at_s / 3600, "plc": 42.8}
         pid = 7 if pid_after is None or number < pid_after else 8
         processes = {name: samples_module.ProcessSample(pid, each, each + 20, 30, 6) for name, each in mb.items()}
         removed = max(0, number - images_from)
@@ -89,6 +102,16 @@ def test_the_page_tells_a_process_that_grows_from_one_that_does_not(soak):
     assert "Not decided" not in text
     assert "It was to run" not in text
     assert "1436 fruit" in text
+
+
+@pytest.mark.parametrize(("leak_mb_per_hour", "held"), [(0.0, "yes"), (4.0, "no")])
+def test_memory_that_is_returned_each_minute_is_no_leak_and_hides_none(soak, leak_mb_per_hour, held):
+    document, samples = soak
+    every = made(samples, leak_mb_per_hour, returns=True)
+    text = document.page(every, document.Ending({}, 0), 60, "", 1.0)
+    assert row(text, "service")[0][-2] == held
+    windows = document.of_process(document.settled(every), "service", lambda each: each.unique_mb)
+    assert str(windows.below(document.MOST_MB_PER_HOUR)) == "no", "else this shows nothing"
 
 
 @pytest.mark.parametrize(("machine", "station", "flat"), [(0.0, 0.0, "yes"), (0.4, 0.0, "yes"), (0.0, 0.4, "no")])
