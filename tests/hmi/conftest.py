@@ -52,6 +52,7 @@ from tests.chromium import ARGUMENTS
 from tests.hosts import fresh_host
 from tests.ports import free_ports
 from tests.quick_recipes import NUMBERS, quick_recipes
+from tests.slower_mode import SLOWER_MODE
 
 PATIENCE_S = 60.0
 ADMIN, ADMIN_PIN = "admin", "482915"
@@ -241,7 +242,9 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
         supervisor = stack.enter_context(begun([*station, "run", "--config", str(file)], log, environment))
         eventually(lambda: said(log, "running", supervisor), 2 * PATIENCE_S)
         configuration = load_configuration(file, {})
-        yield Cell(configuration, console, folder, file, supervisor, environment=environment)
+        made = Cell(configuration, console, folder, file, supervisor, environment=environment)
+        made.twin(**SLOWER_MODE)
+        yield made
 
 
 @pytest.fixture(name="eventually")

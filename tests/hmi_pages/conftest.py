@@ -51,6 +51,7 @@ from station.vocabulary import Reason
 from tests.chromium import ARGUMENTS
 from tests.hosts import fresh_host
 from tests.ports import free_port
+from tests.slower_mode import SLOWER_MODE
 
 PATIENCE_S = 120.0
 PATIENT_HANDSHAKE = {"begin_deadline_s": 10.0, "station_lost_after_s": 30.0, "plc_heartbeat_timeout_s": 30.0}
@@ -273,6 +274,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         made = Site(load_configuration(file, {}), consoles[0], f"http://127.0.0.1:{port}")
         eventually(lambda: _answers(made.address) or _ended(processes, folder / "others.log"))
         made.twin(do="remove")
+        made.twin(**SLOWER_MODE)
         eventually(lambda: made.order(CommandName.RESET).done)
         assert made.order(CommandName.CHANGE_RECIPE, 1).done
         yield made

@@ -25,6 +25,8 @@ _DEAD_LED_REST = 0.12
 _FOG_BLUR_PX = 12.0
 _FULL_LIGHT = (1.0, 1.0, 1.0)
 _GAIN_LIMITS = (0.5, 1.6)
+_STRIP_ROWS = 64
+"""Rows that are summed at a time, which stay in the processor's cache: by whole images a sum takes a fifth longer."""
 _WORN_LOSS = 0.6
 """Of the light's change, where the coating is worn through."""
 
@@ -84,7 +86,7 @@ class DigitSensor:
         self._dent: FloatArray | None = None
         self._condition = Condition()
         # Kept from frame to frame: fresh memory of this size costs as much as the sums.
-        self._lined, self._spread = (np.empty((*SENSOR_SHAPE, 3), np.float32) for _ in range(2))
+        self._lined, self._spread = (np.empty((_STRIP_ROWS, SENSOR_SHAPE[1], 3), np.float32) for _ in range(2))
         self._clean = self._draw(None, self._condition)
         self._base = self._drifted()
 
@@ -114,13 +116,17 @@ class DigitSensor:
         if not self._noise_factor:
             return np.asarray(cv2.convertScaleAbs(np.maximum(self._base, 0.0)), np.uint8)
         factor = np.float32(self._noise_factor)
+        columns, rows = self._noise.columns() * factor, self._noise.rows() * factor
+        pixels, image = self._noise.pixels(), np.empty((*SENSOR_SHAPE, 3), np.uint8)
         lined, spread = self._lined, self._spread
-        np.add(self._base, self._noise.columns() * factor, out=lined)
-        # Spread by OpenCV: numpy's broadcasting along pixels of three channels takes five times as long.
-        cv2.resize(self._noise.rows() * factor, SENSOR_SHAPE[::-1], dst=spread, interpolation=cv2.INTER_NEAREST)
-        cv2.add(lined, spread, dst=lined)
-        pixels = self._noise.pixels()
-        return np.asarray(cv2.addWeighted(pixels, float(factor), lined, 1.0, 0.0, dtype=cv2.CV_8U), np.uint8)
+        for top in range(0, SENSOR_SHAPE[0], _STRIP_ROWS):
+            strip = slice(top, top + _STRIP_ROWS)
+            np.add(self._base[strip], columns, out=lined)
+            # Spread by OpenCV: numpy's broadcasting along pixels of three channels takes five times as long.
+            cv2.resize(rows[strip], spread.shape[1::-1], dst=spread, interpolation=cv2.INTER_NEAREST)
+            cv2.add(lined, spread, dst=lined)
+            cv2.addWeighted(pixels[strip], float(factor), lined, 1.0, 0.0, dst=image[strip], dtype=cv2.CV_8U)
+        return image
 
     def _drifted(self) -> Array:
         return np.asarray(cv2.scaleAdd(self._drift.field, self._drift_factor, self._clean), np.float32)
