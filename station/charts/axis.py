@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 _LEAST_SPAN = 1e-6
+_ROUNDING = 1e-9
+"""Relative: what floating-point numbers may differ by that are meant to be equal."""
 
 
 class Tick(NamedTuple):
@@ -25,9 +27,9 @@ def ticks(least: float, most: float, intervals: int) -> tuple[Tick, ...]:
     """
     span = max(most - least, _LEAST_SPAN)
     power = 10.0 ** math.floor(math.log10(span / intervals))
-    step = next(step * power for step in _STEPS if step * power * intervals >= span * 0.999)
-    digits = max(0, (1 if f"{step:e}".startswith("2.5") else 0) - math.floor(math.log10(step) + 1e-9))
-    first, last = math.floor(least / step + 1e-9), math.ceil(most / step - 1e-9)
+    step = next(step * power for step in _STEPS if step * power * intervals >= span * (1 - _ROUNDING))
+    digits = max(0, (1 if f"{step:e}".startswith("2.5") else 0) - math.floor(math.log10(step) + _ROUNDING))
+    first, last = math.floor(least / step + _ROUNDING), math.ceil(most / step - _ROUNDING)
     return tuple(Tick(number * step, digits) for number in range(first, max(last, first + 1) + 1))
 
 

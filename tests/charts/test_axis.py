@@ -1,12 +1,13 @@
 """Axes: round numbers that reach every value, and positions in their order."""
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from station.charts.axis import Axis, ticks
 
 
 @given(st.floats(-50, 0), st.floats(0.01, 1e4), st.integers(2, 8))
+@example(-40.015625, 0.015625, 2)
 def test_ticks_are_few_round_numbers_that_enclose_all_values(least, most, intervals):
     made = [tick.value for tick in ticks(least, most, intervals)]
     step = made[1] - made[0]
