@@ -1,9 +1,8 @@
 """Timing-bound tests, again and again on busy cores: which of them pass by luck.
 
-A test is timing-bound if it reads a clock, sets a deadline, or waits for something within one. A round runs each of
-them once, in random order, with so many at once that each has the others as its load. Some rounds are played together,
-which share what takes long to make. They are kept at once, and the same command goes on until there are a hundred.
-Writes docs/flaky-tests.md.
+A test is timing-bound if it reads a clock, sets a deadline, or waits for something within one. A round runs all of
+them in random order, with so many at once that each has the others as its load. Every round is kept at once, and the
+same command goes on until there are a hundred. Writes docs/flaky-tests.md.
 """
 
 import argparse
@@ -20,22 +19,19 @@ from xml.etree import ElementTree as ET
 
 import sections
 from reliability.flaky import Round, failures, played, timing_bound
-from reliability.times import split
 from revision import commit
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT = ROOT / "docs" / "flaky-tests.md"
 KEPT = Path(__file__).resolve().parent / "reliability" / "flaky_rounds.json"
 ROUNDS = 100
-TOGETHER = 5
-"""Rounds in one run of pytest."""
 _AT_ONCE = 3
 """Tests a core. With six a core, each core had eight processes to run at a time."""
 _LOAD_EVERY_S = 10.0
 
 
-def play(seed: int, together: int) -> list[Round]:
-    """Play some rounds.
+def play(seed: int) -> Round:
+    """Run all of them once.
 
     Raises:
         SystemExit: pytest ran no test, or was interrupted.
@@ -45,7 +41,6 @@ def play(seed: int, together: int) -> list[Round]:
         report = Path(folder) / "report.xml"
         workers = _AT_ONCE * (os.cpu_count() or 1)
         command = [sys.executable, "-m", "pytest", "-q", "-n", str(workers), "--dist", "worksteal"]
-        command += ["-p", "benchmarks.reliability.times", f"--times={together}"]
         command += [f"--randomly-seed={seed}", f"--junitxml={report}", *timing_bound(ROOT / "tests")]
         with subprocess.Popen(command, cwd=ROOT) as running:
             while True:
@@ -55,25 +50,18 @@ def play(seed: int, together: int) -> list[Round]:
                 except subprocess.TimeoutExpired:
                     loads.append(os.getloadavg()[0])
         if code not in {0, 1}:
-            raise SystemExit(f"pytest ended with {code}: nothing is kept of this run")
+            raise SystemExit(f"pytest ended with {code}: nothing is kept of this round")
         tests = list(ET.parse(report).iter("testcase"))
-    failed: list[set[str]] = [set() for _ in range(together)]
-    for each in tests:
-        if each.find("failure") is not None or each.find("error") is not None:
-            name, number = split(each.get("name", ""))
-            failed[number].add(f"{each.get('classname')}::{name}")
-    return [
-        Round(
-            date=datetime.now(UTC).date().isoformat(),
-            commit=commit(),
-            seed=seed,
-            tests=len(tests) // together,
-            failed=sorted(names),
-            minutes=round((time.monotonic() - began_s) / 60 / together, 1),
-            load=round(sum(loads) / len(loads), 1) if loads else 0.0,
-        )
-        for names in failed
-    ]
+    bad = [each for each in tests if each.find("failure") is not None or each.find("error") is not None]
+    return Round(
+        date=datetime.now(UTC).date().isoformat(),
+        commit=commit(),
+        seed=seed,
+        tests=len(tests),
+        failed=sorted({f"{each.get('classname')}::{each.get('name')}" for each in bad}),
+        minutes=round((time.monotonic() - began_s) / 60, 1),
+        load=round(sum(loads) / len(loads), 1) if loads else 0.0,
+    )
 
 
 def main() -> None:
@@ -85,13 +73,11 @@ def main() -> None:
     rounds: list[Round] = json.loads(KEPT.read_text("utf-8")) if KEPT.exists() else []
     began_s = time.monotonic()
     while len(rounds) < asked.rounds and time.monotonic() - began_s < 60 * asked.minutes:
-        new = play(rounds[-1]["seed"] + 1 if rounds else 1, min(TOGETHER, asked.rounds - len(rounds)))
-        rounds += new
+        rounds.append(play(rounds[-1]["seed"] + 1 if rounds else 1))
         KEPT.write_text(json.dumps(rounds, indent=1) + "\n", encoding="utf-8")
         machine = f"{os.cpu_count()} cores ({platform.machine()})"
         sections.write(DOCUMENT, {"played": played(rounds, ROUNDS, machine), "failures": failures(rounds)})
-        failed = sorted({name for each in new for name in each["failed"]})
-        print(f"{len(rounds)} rounds: {new[0]['minutes']} min each, failed: {failed or 'none'}", flush=True)
+        print(f"round {len(rounds)}: {rounds[-1]['minutes']} min, failed: {rounds[-1]['failed'] or 'none'}", flush=True)
 
 
 if __name__ == "__main__":

@@ -13,12 +13,12 @@ _CLOCK = re.compile(
 
 
 class Round(TypedDict):
-    """One run of each test."""
+    """One run of all the tests."""
 
     date: str
     commit: str
     seed: int
-    """Of the order, which rounds played together share."""
+    """Of the order."""
     tests: int
     failed: list[str]
     minutes: float

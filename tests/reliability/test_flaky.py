@@ -1,11 +1,6 @@
 """Which tests are timing-bound, and what the kept rounds say."""
 
-import pytest
-
 from benchmarks.reliability.flaky import Round, failures, played, timing_bound
-from benchmarks.reliability.times import split
-
-pytest_plugins = ("pytester",)
 
 FILE = """
 def waits(until):
@@ -44,25 +39,3 @@ def test_a_failure_is_open_until_a_round_has_passed_since():
     assert "passed in 1." in said
     assert "900 runs of a test in all, of which   3 failed" in said
     assert "load 7.0 to 9.0" in said
-
-
-def test_each_test_runs_so_many_times_and_its_name_tells_which(pytester):
-    pytester.makepyfile(
-        """
-        import pytest
-
-        def test_plain():
-            pass
-
-        @pytest.mark.parametrize("case", ["a-b", "c"])
-        def test_cases(case):
-            pass
-        """
-    )
-    options = ("-q", "-p", "no:randomly", "-p", "benchmarks.reliability.times", "--times=2", "--collect-only")
-    names = [line.split("::")[1] for line in pytester.runpytest_inprocess(*options).outlines if "::" in line]
-    plain = [("test_plain", 0), ("test_plain", 1)]
-    cases = [(f"test_cases[{case}]", time) for time in (0, 1) for case in ("a-b", "c")]
-    assert sorted(map(split, names)) == sorted(plain + cases)
-    with pytest.raises(ValueError, match="test_other"):
-        split("test_other[x]")
