@@ -42,9 +42,9 @@ class Connection(asyncio.BufferedProtocol):
         self._transport.write(data)
 
     async def close(self) -> None:
-        """Close it. Idempotent."""
-        self._transport.close()
-        await self._lost
+        """Close it, at once: what is not sent by then is dropped. Idempotent."""
+        self._transport.abort()  # `close` would wait for a peer that takes nothing
+        await asyncio.wait((self._lost,))  # which a cancellation of this wait leaves alone
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """See `asyncio.BufferedProtocol`, as for all below."""
