@@ -213,6 +213,7 @@ class Interface:
         """Send a request over the channel, whose troubles delay or lose it or its answer."""
         settled: list[bool] = []
         timer = self._clock.after(within_s, partial(self._settle, settled, failed))
+        deadline_s = self._clock.s + within_s
 
         def answer(value: Any) -> None:
             def arrive() -> None:
@@ -223,7 +224,7 @@ class Interface:
                 self._clock.after(delay_s, arrive)
 
         def arrived() -> None:
-            if self._machine.station.alive:
+            if self._machine.station.alive and self._clock.s < deadline_s:  # the channel's server drops a later one
                 ask(answer)
 
         if (delay_s := self._way_s()) is not None:

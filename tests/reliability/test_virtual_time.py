@@ -58,12 +58,14 @@ def test_laws_hold_over_a_thousand_triggers():
             True,
             [("disk", "full", 77.789, 8.463), ("station", "kill", 82.519, 1.353), ("interface", "kill", 83.795, 0.391)],
         ),
+        (5467, 49, False, [("channel", "intermittent", 91.248, 1.446), ("channel", "delayed", 93.068, 1.72)]),
     ],
     ids=[
         "a connection cut and made again within a scan arms again",
         "a last step that shows nothing passes by no earlier limit",
         "an area beyond the last limit's closing is not held against it",
         "an outcome of the interface's own that a full disk kept from the journal is not made anew",
+        "a trigger that arrives after the interface has given it up begins nothing",
     ],
 )
 def test_a_story_that_broke_a_law_holds_them_now(seed, fruits, carries, troubles):
