@@ -40,7 +40,7 @@ def play(seed: int) -> Round:
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.xml"
         workers = _AT_ONCE * (os.cpu_count() or 1)
-        command = [sys.executable, "-m", "pytest", "-q", "-n", str(workers), "--dist", "worksteal"]
+        command = [sys.executable, "-m", "pytest", "-q", "-n", str(workers), "-p", "benchmarks.reliability.together"]
         command += [f"--randomly-seed={seed}", f"--junitxml={report}", *timing_bound(ROOT / "tests")]
         with subprocess.Popen(command, cwd=ROOT) as running:
             while True:

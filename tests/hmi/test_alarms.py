@@ -9,6 +9,12 @@ from tests.chromium import follow
 
 @pytest.mark.timeout(240)
 def test_the_life_of_an_alarm(ready, operator, eventually):
+    def life():
+        rows = operator.page.locator(".log tbody tr", has_text="camera gives no frames").all_inner_texts()
+        return [re.findall("raised|shown again|shelved|returned to normal|acknowledged", row)[0] for row in rows][::-1]
+
+    operator.open("/alarms/history")
+    earlier = len(life())
     ready.twin(do="set", device="camera", fault="off")
     try:
         operator.open("/alarms")
@@ -16,7 +22,7 @@ def test_the_life_of_an_alarm(ready, operator, eventually):
         alarm = operator.page.locator(".alarm", has_text="tactile camera gives no frames")
         assert "not acknowledged" in alarm.inner_text()
         follow(alarm.get_by_role("button", name="Acknowledge"))
-        operator.until(".alarm", "acknowledged · since")
+        alarm.filter(has_text="acknowledged · since").wait_for()
         ready.until(lambda state: [a.state for a in state.alarms if a.alarm == "camera_lost"] == ["acknowledged"])
         follow(operator.page.locator(".alarm", has_text="camera").get_by_role("link", name="Details"))
         assert "Check the camera's cable" in operator.text("article")
@@ -37,16 +43,15 @@ def test_the_life_of_an_alarm(ready, operator, eventually):
         operator.open("/alarms")
     finally:
         ready.twin(do="clear", device="camera")
-    operator.until(".alarm", "returned to normal, not acknowledged")
-    follow(operator.page.locator(".alarm", has_text="camera").get_by_role("button", name="Acknowledge"))
+    alarm.filter(has_text="returned to normal, not acknowledged").wait_for()
+    follow(alarm.get_by_role("button", name="Acknowledge"))
     ready.until(lambda state: not any(a.alarm == "camera_lost" for a in state.alarms))
     follow(operator.page.locator("main").get_by_role("link", name="History"))
 
     def history():  # which is written behind
         operator.page.reload()
-        rows = operator.page.locator(".log tbody tr", has_text="camera gives no frames").all_inner_texts()
-        changes = [re.findall("raised|shown again|shelved|returned to normal|acknowledged", row)[0] for row in rows]
+        changes = life()[earlier:]
         first = ["raised", "acknowledged", "shelved", "shown again"]
-        return changes[::-1][:4] == first and sorted(changes[::-1][4:]) == ["acknowledged", "returned to normal"]
+        return changes[:4] == first and sorted(changes[4:]) == ["acknowledged", "returned to normal"]
 
     eventually(history)

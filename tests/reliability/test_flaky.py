@@ -2,6 +2,8 @@
 
 from benchmarks.reliability.flaky import Round, failures, played, timing_bound
 
+pytest_plugins = ("pytester",)
+
 FILE = """
 def waits(until):
     until(lambda: True)
@@ -39,3 +41,16 @@ def test_a_failure_is_open_until_a_round_has_passed_since():
     assert "passed in 1." in said
     assert "900 runs of a test in all, of which   3 failed" in said
     assert "load 7.0 to 9.0" in said
+
+
+def test_tests_that_share_a_station_run_in_one_worker(pytester):
+    folder = pytester.mkpydir("tests").joinpath("hmi")
+    folder.mkdir()
+    for name in "abcdef":
+        (folder / f"test_{name}.py").write_text(
+            "import os\ndef test_it():\n    print('by', os.environ['PYTEST_XDIST_WORKER'])\n"
+        )
+    options = ("-n", "3", "-rP", "-p", "no:cacheprovider", "-p", "benchmarks.reliability.together", "tests")
+    said = pytester.runpytest_subprocess(*options)
+    said.assert_outcomes(passed=6)
+    assert len({line for line in said.outlines if line.startswith("by ")}) == 1
