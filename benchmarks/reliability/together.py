@@ -1,6 +1,7 @@
 """pytest plugin: the tests that share a whole station stay with one of xdist's workers, which starts it once."""
 
 import pytest
+from xdist.remote import Producer
 from xdist.scheduler.loadscope import LoadScopeScheduling
 
 STATIONS = ("hmi", "hmi_pages")
@@ -14,6 +15,6 @@ class Together(LoadScopeScheduling):
         return next((folder for folder in STATIONS if nodeid.startswith(f"tests/{folder}/")), nodeid)
 
 
-def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> Together:
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Together:
     """Take the place of the scheduling that `--dist` names."""
     return Together(config, log)

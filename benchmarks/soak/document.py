@@ -64,7 +64,7 @@ at 95%): 158.1 MB in most windows of the last 30 minutes, and 133 where one ende
 In the next run, of an hour on that day, the PLC's reply and the trigger's way to the outcome were flat, and the service
 was at +3.45 MB an hour (2.05 to 5.07). Installations and tests ran beside it at idle priority for most of the time: a
 slower machine takes longer to fill the heap again after a return, so that windows ended anywhere between 136 and 161
-MB, ever fewer of them low. Since then the most of each two minutes is judged; the table above is still of all windows.\
+MB, ever fewer of them low. Since then the most of each two minutes is judged.\
 """
 """Written by hand: the stories behind a figure that was wrong once."""
 

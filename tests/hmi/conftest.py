@@ -303,7 +303,7 @@ class Panel:
             try:
                 self.page.goto(self.address + path)
             except BrowserError as error:
-                if not any(why in str(error) for why in ("ERR_CONNECTION_REFUSED", "interrupted by another navigation")):
+                if not any(why in str(error) for why in ("ERR_CONNECTION_REFUSED", "by another navigation")):
                     raise
                 return False
             return True
