@@ -67,7 +67,7 @@ slower machine takes longer to fill the heap again after a return, so that windo
 MB, ever fewer of them low. Since then the most of each two minutes is judged.
 
 The hour after had nothing of ours beside it, but somebody else's work on the machine (the bare server's p99 was 16 ms
-in its worst window, 0.6 as a rule): +0.54 MB an hour, from −0.76 to +2.33, which decides nothing. To judge the
+in its worst window, 0.6 as a rule): +0.54 MB an hour, from -0.76 to +2.33, which decides nothing. To judge the
 least in place of the most would decide no sooner: in a run of four minutes, read twice a second, the least resident
 memory after each return was 175, 190, 193 and 191 MB.\
 """
