@@ -66,9 +66,9 @@ was at +3.45 MB an hour (2.05 to 5.07). Installations and tests ran beside it at
 slower machine takes longer to fill the heap again after a return, so that windows ended anywhere between 136 and 161
 MB, ever fewer of them low. Since then the most of each two minutes is judged.
 
-The hour after had nothing of ours beside it, but somebody else's work on the machine (the bare server's p99 was 16 ms
-in its worst window, 0.6 as a rule): +0.54 MB an hour, from -0.76 to +2.33, which decides nothing. To judge the
-least in place of the most would decide no sooner: in a run of four minutes, read twice a second, the least resident
+The hour after had nothing of ours beside it, but a machine that was busy elsewhere, as the bare server's p99 suggests
+(16 ms in its worst window, 0.6 as a rule): +0.54 MB an hour, from -0.76 to +2.33, which decides nothing. To judge the
+least in place of the most would hardly decide sooner: in a run of four minutes, read twice a second, the least resident
 memory after each return was 175, 190, 193 and 191 MB.\
 """
 """Written by hand: the stories behind a figure that was wrong once."""

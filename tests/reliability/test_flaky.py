@@ -1,6 +1,8 @@
 """Which tests are timing-bound, and what the kept rounds say."""
 
 from benchmarks.reliability.flaky import Round, failures, played, timing_bound
+from benchmarks.reliability.together import STATIONS
+from tests.conftest import KEPT
 
 pytest_plugins = ("pytester",)
 
@@ -43,14 +45,20 @@ def test_a_failure_is_open_until_a_round_has_passed_since():
     assert "load 7.0 to 9.0" in said
 
 
-def test_tests_that_share_a_station_run_in_one_worker(pytester):
-    folder = pytester.mkpydir("tests").joinpath("hmi")
-    folder.mkdir()
-    for name in "abcdef":
-        (folder / f"test_{name}.py").write_text(
-            "import os\ndef test_it():\n    print('by', os.environ['PYTEST_XDIST_WORKER'])\n"
-        )
+def test_tests_that_share_a_station_run_in_one_worker_and_others_in_any(pytester):
+    tests = pytester.mkpydir("tests")
+    for folder in ("hmi", "records"):
+        (tests / folder).mkdir()
+        for name in "abcdef":
+            (tests / folder / f"test_{folder}_{name}.py").write_text(
+                f"import os\ndef test_it():\n    print('{folder} by', os.environ['PYTEST_XDIST_WORKER'])\n"
+            )
     options = ("-n", "3", "-rP", "-p", "no:cacheprovider", "-p", "benchmarks.reliability.together", "tests")
     said = pytester.runpytest_subprocess(*options)
-    said.assert_outcomes(passed=6)
-    assert len({line for line in said.outlines if line.startswith("by ")}) == 1
+    said.assert_outcomes(passed=12)
+    assert len({line for line in said.outlines if line.startswith("hmi by")}) == 1
+    assert len({line for line in said.outlines if line.startswith("records by")}) > 1
+
+
+def test_folders_of_a_station_are_those_that_a_whole_run_keeps_together():
+    assert {(folder,) for folder in STATIONS} <= set(KEPT)
