@@ -5,6 +5,7 @@ import re
 import pytest
 
 from tests.chromium import follow
+from tests.slower_mode import SLOWER_MODE
 
 
 @pytest.mark.timeout(240)
@@ -43,6 +44,7 @@ def test_the_life_of_an_alarm(ready, operator, eventually):
         operator.open("/alarms")
     finally:
         ready.twin(do="clear", device="camera")
+        ready.twin(**SLOWER_MODE)  # as the other tests of the station have it
     alarm.filter(has_text="returned to normal, not acknowledged").wait_for()
     follow(alarm.get_by_role("button", name="Acknowledge"))
     ready.until(lambda state: not any(a.alarm == "camera_lost" for a in state.alarms))
