@@ -45,19 +45,22 @@ def test_a_failure_is_open_until_a_round_has_passed_since():
     assert "load 7.0 to 9.0" in said
 
 
-def test_tests_that_share_a_station_run_in_one_worker_and_others_in_any(pytester):
+def test_tests_that_share_a_station_run_in_few_workers_and_others_in_any(pytester):
     tests = pytester.mkpydir("tests")
-    for folder in ("hmi", "records"):
+    for folder in ("hmi", "hmi_pages", "records"):
         (tests / folder).mkdir()
         for name in "abcdef":
             (tests / folder / f"test_{folder}_{name}.py").write_text(
                 f"import os\ndef test_it():\n    print('{folder} by', os.environ['PYTEST_XDIST_WORKER'])\n"
             )
-    options = ("-n", "3", "-rP", "-p", "no:cacheprovider", "-p", "benchmarks.reliability.together", "tests")
+    options = ("-n", "5", "-rP", "-p", "no:cacheprovider", "-p", "benchmarks.reliability.together", "tests")
     said = pytester.runpytest_subprocess(*options)
-    said.assert_outcomes(passed=12)
-    assert len({line for line in said.outlines if line.startswith("hmi by")}) == 1
-    assert len({line for line in said.outlines if line.startswith("records by")}) > 1
+    said.assert_outcomes(passed=18)
+    by = {
+        folder: {line for line in said.outlines if line.startswith(f"{folder} by")} for folder in (*STATIONS, "records")
+    }
+    assert len(by.pop("records")) > 1
+    assert {folder: len(lines) for folder, lines in by.items()} == STATIONS
 
 
 def test_folders_of_a_station_are_those_that_a_whole_run_keeps_together():
