@@ -10,6 +10,8 @@ import psutil
 from looking.rounds import OWN_PHASES
 from prometheus_client.parser import text_string_to_metric_families
 
+from .heap import in_use_bytes
+
 MARKS = {
     "service": "-m station service",
     "arm": "-m station.devices.arm.process",
@@ -29,6 +31,8 @@ class ProcessSample(NamedTuple):
     pid: int
     unique_mb: float
     """Memory that no other process shares: what would be free without it."""
+    in_use_mb: float
+    """Of that, what is not free in the process's heap."""
     resident_mb: float
     descriptors: int
     threads: int
@@ -82,14 +86,13 @@ def processes(marked: Sequence[psutil.Process]) -> dict[str, ProcessSample]:
     """
     found = dict[str, ProcessSample]()
     for process in marked:
-        with contextlib.suppress(psutil.NoSuchProcess), process.oneshot():
+        with contextlib.suppress(psutil.NoSuchProcess, ProcessLookupError), process.oneshot():
             line = " ".join(process.cmdline())
             name = next((name for name, mark in MARKS.items() if mark in line), None)
             if name is not None:
-                memory = process.memory_full_info()
-                found[name] = ProcessSample(
-                    process.pid, memory.uss / _MB, memory.rss / _MB, process.num_fds(), process.num_threads()
-                )
+                memory, in_use_mb = process.memory_full_info(), in_use_bytes(process.pid) / _MB
+                pieces = process.num_fds(), process.num_threads()
+                found[name] = ProcessSample(process.pid, memory.uss / _MB, in_use_mb, memory.rss / _MB, *pieces)
     return found
 
 

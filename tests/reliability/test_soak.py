@@ -1,16 +1,23 @@
 """The soak's verdicts: what an interval decides, and what the page says of a station that grows or does not."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
+from benchmarks.soak.heap import in_use_bytes
 from benchmarks.soak.slopes import Slope, Verdict, slope
 
 ROOT = Path(__file__).resolve().parents[2]
 WINDOWS = 270
 """Of ten seconds: what an hour leaves after its warm-up."""
 AT_S = [10.0 * number for number in range(WINDOWS)]
+OWN, IN_USE = 7, -2
+"""Columns of the verdicts on memory that no other process shares, and on what of it is in use."""
 
 
 def remembering(seed, memory, deviation):
@@ -62,19 +69,25 @@ def made(
     machine=0.0,
     station=0.0,
     returns=False,
+    reaches=0.0,
 ):
     """An hour's samples of a station whose service grows, or which gets slower with its machine or by itself.
 
     With `returns`, samples lie within the refilling of a heap, whose freed memory is returned, ever nearer to its end.
+    With `reaches`, the heap of the service has to be larger by so much from the middle on.
     """
 
     def one(number):
         at_s = 10.0 * (number + 1)
         noise = 0.05 * (number * 7 % 5)
         low = 8 * (1 - number / windows) * (number * 7 % 12) / 12 if returns else 0.0
-        mb = {"service": 160 - low + noise + leak_mb_per_hour * at_s / 3600, "plc": 42.8}
+        in_use = {"service": 120 + noise + leak_mb_per_hour * at_s / 3600, "plc": 42.8}
+        free = {"service": 40 - low + reaches * (number > windows / 2), "plc": 0.0}
         pid = 7 if pid_after is None or number < pid_after else 8
-        processes = {name: samples_module.ProcessSample(pid, each, each + 20, 30, 6) for name, each in mb.items()}
+        processes = {
+            name: samples_module.ProcessSample(pid, each + free[name], each, each + free[name] + 20, 30, 6)
+            for name, each in in_use.items()
+        }
         removed = max(0, number - images_from)
         slower, as_begun = 1 + machine * at_s / 3600, 1 + (machine + station) * at_s / 7200
         ours = slower + station * at_s / 3600
@@ -96,9 +109,9 @@ def test_the_page_tells_a_process_that_grows_from_one_that_does_not(soak):
     document, samples = soak
     text = document.page(made(samples, leak_mb_per_hour=4.0), document.Ending({"PASS": 1436}, 0), 60, "", 1.0)
     memory, pieces = row(text, "service")
-    assert memory[-2:] == ["no", "0"]
+    assert (memory[OWN], *memory[-2:]) == ("no", "no", "0")
     assert (pieces[3], pieces[6]) == ("yes", "yes")
-    assert row(text, "plc")[0][-2] == "yes"
+    assert [row(text, "plc")[0][column] for column in (OWN, IN_USE)] == ["yes"] * 2
     assert "Not decided" not in text
     assert "It was to run" not in text
     assert "1436 fruit" in text
@@ -109,9 +122,51 @@ def test_memory_that_is_returned_each_minute_is_no_leak_and_hides_none(soak, lea
     document, samples = soak
     every = made(samples, leak_mb_per_hour, returns=True)
     text = document.page(every, document.Ending({}, 0), 60, "", 1.0)
-    assert row(text, "service")[0][-2] == held
+    assert [row(text, "service")[0][column] for column in (OWN, IN_USE)] == [held] * 2
     windows = document.of_process(document.settled(every), "service", lambda each: each.unique_mb)
     assert str(windows.below(document.MOST_MB_PER_HOUR)) == "no", "else this shows nothing"
+
+
+def test_a_heap_that_had_to_be_larger_once_is_told_from_a_leak(soak):
+    document, samples = soak
+    text = document.page(made(samples, reaches=3.0), document.Ending({}, 0), 60, "", 1.0)
+    assert [row(text, "service")[0][column] for column in (OWN, IN_USE)] == ["not decided", "yes"]
+
+
+PROGRAM = """
+import sys
+held = [bytearray(each) for each in [300_000, 700] * int(sys.argv[1])]
+freed = [bytearray(300_000) for _ in range(100)]
+last = bytearray(700)
+del freed
+print("ready", flush=True)
+input()
+"""
+"""Keeps pairs of a large and a small piece, and a heap in which as much as 100 large ones is free below the last."""
+
+
+def started(pairs):
+    program = [sys.executable, "-c", PROGRAM, str(pairs)]
+    retains = {**os.environ, "MALLOC_MMAP_THRESHOLD_": "8388608", "MALLOC_TRIM_THRESHOLD_": "67108864"}
+    return subprocess.Popen(program, env=retains, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+def test_what_is_free_in_a_heap_is_not_in_use_and_what_is_kept_is():
+    found = {}
+    for pairs in (0, 100):
+        with started(pairs) as process:
+            assert process.stdout.readline() == "ready\n"
+            found[pairs] = (in_use_bytes(process.pid), psutil.Process(process.pid).memory_full_info().uss)
+            process.communicate("\n")
+    assert found[0][1] - found[0][0] > 29e6
+    assert found[100][0] - found[0][0] == pytest.approx(100 * 300_700, rel=0.02)
+
+
+def test_a_process_that_has_ended_has_no_memory():
+    with started(0) as process:
+        process.communicate("\n")
+    with pytest.raises(ProcessLookupError):
+        in_use_bytes(process.pid)
 
 
 @pytest.mark.parametrize(("machine", "station", "flat"), [(0.0, 0.0, "yes"), (0.4, 0.0, "yes"), (0.0, 0.4, "no")])
@@ -131,7 +186,7 @@ def test_a_short_run_decides_nothing_and_says_so(soak, windows):
     text = document.page(made(samples, windows=windows), ending, 60, "", 1.0)
     assert "**Not decided**" in text
     assert "It was to run for 60 minutes" in " ".join(text.splitlines())
-    assert row(text, "service")[0][-2] == "not decided"
+    assert [row(text, "service")[0][column] for column in (OWN, IN_USE)] == ["not decided"] * 2
 
 
 def test_a_process_that_was_started_again_is_named_and_its_slope_is_that_of_the_new_one(soak):
