@@ -155,6 +155,7 @@ def test_what_is_free_in_a_heap_is_not_in_use_and_what_is_kept_is():
     found = {}
     for pairs in (0, 100):
         with started(pairs) as process:
+            assert process.stdout is not None
             assert process.stdout.readline() == "ready\n"
             found[pairs] = (in_use_bytes(process.pid), psutil.Process(process.pid).memory_full_info().uss)
             process.communicate("\n")
