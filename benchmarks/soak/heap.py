@@ -52,7 +52,10 @@ def _walked(pid: int) -> int | None:
     if place is None:
         return 0
     begins, ends = (int(address, 16) for address in place.split("-"))
-    memory = os.open(f"/proc/{pid}/mem", os.O_RDONLY)
+    try:
+        memory = os.open(f"/proc/{pid}/mem", os.O_RDONLY)
+    except PermissionError:
+        return None
     try:
         heap = os.pread(memory, ends - begins, begins)
     finally:
