@@ -73,13 +73,13 @@ memory after each return was 175, 190, 193 and 191 MB.
 
 Two hours, also on that day, with nothing beside them for the first 95 minutes: +2.92 MB an hour (1.48 to 4.31), so not
 under 1. It is one step: 157 to 160 MB from minute 14 to 66, and 160 to 165 from minute 68 on. Read from outside, what
-the heap had in use in pieces smaller than an image was 30.3 MB in minute 97 and 30.2 in minute 119, some 500 fruit
-later, and the memory outside of the heap was the same to the kilobyte. A piece of 3.84 MB was new: the size of Python's
-table of interned strings once it has been enlarged. In Python 3.11 `pathlib` interns every part of a path, and each
-image has a name and a folder of its own, as has its unfinished file. In another run the table had 65,819 of its 87,381
-places taken after 11 minutes, and took 484 more in a minute; the place of a name that is gone is free only once the
-table is made anew. By `used * 3` (CPython's Objects/dictobject.c) it doubles then, and stays so large from then on.
-That the step was this is inferred: its minute, its size and its being the only one fit; it was not watched.\
+the heap had in use in pieces under 20 kB was 30.3 MB in minute 97 and 30.2 in minute 119, some 500 fruit later, and the
+memory outside of the heap was the same to the kilobyte. A piece of 3.84 MB was new: the size of Python's table of
+interned strings once it has been enlarged. In Python 3.11 `pathlib` interns every part of a path, and each image has a
+name and a folder of its own, as has its unfinished file. In another run the table had 65,819 of its 87,381 places taken
+after 11 minutes, and took 484 more in a minute; the place of a name that is gone is free only once the table is made
+anew. By `used * 3` (CPython's Objects/dictobject.c) it doubles then, and stays so large from then on. That the step was
+this is inferred from its minute and its size, not watched; the enlarged table would explain 1.9 of its some 3 MB.\
 """
 """Written by hand: the stories behind a figure that was wrong once."""
 
@@ -134,7 +134,7 @@ def of_process(samples: Sequence[Sample], name: str, what: Callable[[ProcessSamp
     return Series(name, [at_s for at_s, _ in last], [what(process) for _, process in last])
 
 
-def each_return(series: Series, chosen: Callable[[Sequence[tuple[float, float]]], tuple[float, float]]) -> Series:
+def of_each_return(series: Series, chosen: Callable[[Sequence[tuple[float, float]]], tuple[float, float]]) -> Series:
     """Return one value of each two minutes, wherever between two returns of freed memory the samples were.
 
     Args:
@@ -157,7 +157,7 @@ class Memory(NamedTuple):
     """Of that, what is not free in the process's heap: the least of each two minutes."""
 
 
-def memory(samples: Sequence[Sample], name: str) -> Memory:
+def memory_of(samples: Sequence[Sample], name: str) -> Memory:
     """Return a process's memory, since its last restart.
 
     Args:
@@ -166,7 +166,7 @@ def memory(samples: Sequence[Sample], name: str) -> Memory:
     """
     own = of_process(samples, name, lambda each: each.unique_mb)
     in_use = of_process(samples, name, lambda each: each.in_use_mb)
-    return Memory(each_return(own, max), each_return(in_use, min))
+    return Memory(of_each_return(own, max), of_each_return(in_use, min))
 
 
 class Timing(NamedTuple):
@@ -244,23 +244,23 @@ def memory_table(samples: Sequence[Sample]) -> list[str]:
     """Return each process's memory."""
     after = settled(samples)
     limit, rises = f"under {MOST_MB_PER_HOUR:g} MB/h", f"MB/h ({CONFIDENCE:.0%})"
-    own = ("MB: first", "after the warm-up", "last", "most", "resident, last", rises, limit)
-    in_use_too = ("in use, MB", f"in use: {rises}", f"in use: {limit}")
-    lines = tables.header("process", *own, *in_use_too, "restarts")
+    heads = ("MB: first", "after the warm-up", "last", "most", "resident, last", rises, limit)
+    in_use_heads = ("in use, MB", f"in use: {rises}", f"in use: {limit}")
+    lines = tables.header("process", *heads, *in_use_heads, "restarts")
     for name in present(samples):
         every = of_process(samples, name, lambda each: each.unique_mb).values
         late = of_process(after, name, lambda each: each.unique_mb)
         resident = of_process(after, name, lambda each: each.resident_mb).values[-1]
         figures = (f"{each:.1f}" for each in (every[0], late.values[0], late.values[-1], max(every), resident))
-        slopes = [
-            text
-            for each in memory(after, name)
-            for text in (in_words(each.slope, 2), "" if name == TWIN else each.below(MOST_MB_PER_HOUR))
-        ]
-        in_use = f"{statistics.median(memory(after, name).in_use.values):.1f}"
-        restarted = str(restarts(samples, name))
-        lines.append(tables.row(name, *figures, *slopes[:2], in_use, *slopes[2:], restarted))
+        own, in_use = (_rise_of_memory(each) for each in memory_of(after, name))
+        used = f"{statistics.median(memory_of(after, name).in_use.values):.1f}"
+        lines.append(tables.row(name, *figures, *own, used, *in_use, str(restarts(samples, name))))
     return lines
+
+
+def _rise_of_memory(series: Series) -> tuple[str, str]:
+    """The rise, and whether it is under the limit."""
+    return in_words(series.slope, 2), "" if series.name == TWIN else series.below(MOST_MB_PER_HOUR)
 
 
 def pieces_table(samples: Sequence[Sample]) -> list[str]:
@@ -307,7 +307,7 @@ def present(samples: Sequence[Sample]) -> list[str]:
 def undecided(samples: Sequence[Sample]) -> str:
     """Return what is to be done about slopes that the run was too short for; empty where there are none."""
     after = settled(samples)
-    series = [each for name in present(samples) if name != TWIN for each in memory(after, name)]
+    series = [each for name in present(samples) if name != TWIN for each in memory_of(after, name)]
     if all(each.below(MOST_MB_PER_HOUR) is not Verdict.UNDECIDED for each in series):
         return ""
     return "\n**Not decided**: the run was too short for at least one process's memory; run it for longer.\n"

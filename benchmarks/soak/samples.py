@@ -86,7 +86,7 @@ def processes(marked: Sequence[psutil.Process]) -> dict[str, ProcessSample]:
     """
     found = dict[str, ProcessSample]()
     for process in marked:
-        with contextlib.suppress(psutil.NoSuchProcess, ProcessLookupError), process.oneshot():
+        with contextlib.suppress(psutil.NoSuchProcess), process.oneshot():
             line = " ".join(process.cmdline())
             name = next((name for name, mark in MARKS.items() if mark in line), None)
             if name is not None:

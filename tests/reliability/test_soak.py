@@ -166,7 +166,7 @@ def test_what_is_free_in_a_heap_is_not_in_use_and_what_is_kept_is():
 def test_a_process_that_has_ended_has_no_memory():
     with started(0) as process:
         process.communicate("\n")
-    with pytest.raises(ProcessLookupError):
+    with pytest.raises(psutil.NoSuchProcess):
         in_use_bytes(process.pid)
 
 
