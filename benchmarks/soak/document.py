@@ -353,8 +353,9 @@ def page(samples: Sequence[Sample], ending: Ending, minutes: float, trouble: str
         f"A verdict needs the whole interval on one side, and {DECIDES_S / 60:.0f} minutes; else it is *not decided*. "
         f"Memory is what no other process shares (USS), and its slope that of the most in each {RETURN_S / 60:.0f} "
         "minutes: once a minute the service returns what it has freed, and takes it again with the next fruit. *In "
-        "use* is what of it is not free in the C library's heap, whose chunks are counted from outside, and its slope "
-        f"that of the least in each {RETURN_S / 60:.0f} minutes. A heap that had to reach further once, as more "
+        "use* is what of it is not free in the C library's heap, whose chunks are counted from outside (of a heap that "
+        "cannot be walked, as the twin's, all counts), and its slope that of the least in each "
+        f"{RETURN_S / 60:.0f} minutes. A heap that had to reach further once, as more "
         "happened at once, stays so large; what is not given back is in use."
     )
     flat = (

@@ -19,11 +19,12 @@ _TRIES = 20
 def in_use_bytes(pid: int) -> int:
     """Return what a process uses of the memory that no other process shares, in bytes.
 
-    Where its heap cannot be walked, all of the heap counts as used.
+    Where its heap cannot be walked, all of the heap counts as used. So it is with one that has no room to go on where it
+    began, and goes on elsewhere.
 
     Raises:
         psutil.NoSuchProcess: it has ended.
-        psutil.AccessDenied: it is another user's.
+        psutil.AccessDenied: its regions may not be listed.
     """
     process, own = psutil.Process(pid), 0
     for _ in range(_TRIES):
