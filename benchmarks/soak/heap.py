@@ -19,7 +19,7 @@ _TRIES = 20
 def in_use_bytes(pid: int) -> int:
     """Return what a process uses of the memory that no other process shares, in bytes.
 
-    Where its heap cannot be walked, all of the heap counts as used. So it is with one that has no room to go on where it
+    Where its heap cannot be walked, all of the heap counts as used. So it is with one that has no room where it
     began, and goes on elsewhere.
 
     Raises:
