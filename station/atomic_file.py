@@ -5,12 +5,20 @@ import os
 import secrets
 from pathlib import Path
 
+# No path with a name that comes but once goes through pathlib here: it interns every part of a path, and Python 3.12
+# before 3.12.7 never gives an interned string back (github.com/python/cpython/issues/113993).
+
 PARTIAL = ".partial"
 """Suffix of a file that is not complete; one that a killed process left may be removed."""
 
 
 def write_atomically(
-    path: Path, data: bytes, mode: int | None = None, *, owner: tuple[int, int] | None = None, durable: bool = True
+    path: Path | str,
+    data: bytes,
+    mode: int | None = None,
+    *,
+    owner: tuple[int, int] | None = None,
+    durable: bool = True,
 ) -> None:
     """Replace a file as a whole: a reader, or whoever comes after a kill or a loss of power, finds the old or the new.
 
@@ -23,7 +31,8 @@ def write_atomically(
     Raises:
         OSError: it cannot be written; the old file is as it was.
     """
-    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PARTIAL}")
+    folder, name = os.path.split(path)
+    partial = os.path.join(folder, f".{name}.{secrets.token_hex(4)}{PARTIAL}")
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
     descriptor = os.open(partial, flags, 0o666 if mode is None else 0o600)
     try:
@@ -36,16 +45,16 @@ def write_atomically(
                 os.fchown(file.fileno(), *owner)
             if durable:
                 os.fsync(file.fileno())
-        partial.replace(path)
+        os.replace(partial, path)
     except BaseException:
         with contextlib.suppress(OSError):
-            partial.unlink()
+            os.unlink(partial)
         raise
     if durable:
-        sync_folder(path.parent)
+        sync_folder(folder or ".")
 
 
-def sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path | str) -> None:
     """Make the names in a folder durable.
 
     Raises:

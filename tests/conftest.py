@@ -193,6 +193,20 @@ def chromium() -> str:
 
 
 @pytest.fixture
+def interned(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Notes the strings that Python code interns, as pathlib does; Python 3.12 before 3.12.7 keeps each for ever."""
+    strings: list[str] = []
+    intern = sys.intern
+
+    def noted(string: str) -> str:
+        strings.append(string)
+        return intern(string)
+
+    monkeypatch.setattr(sys, "intern", noted)
+    return strings
+
+
+@pytest.fixture
 def unused_port() -> int:
     """A loopback port that nobody listens on."""
     return free_port()

@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -35,18 +34,18 @@ def test_a_killed_writer_leaves_the_old_or_the_new_file(tmp_path):
 
 def test_content_is_on_the_disk_before_the_name_and_the_name_before_it_returns(tmp_path, monkeypatch):
     path, steps = tmp_path / "state.json", []
-    fsync, replace = os.fsync, Path.replace
+    fsync, replace = os.fsync, os.replace
 
     def noted_fsync(descriptor):
         steps.append("folder" if os.path.isdir(f"/proc/self/fd/{descriptor}") else "file")  # noqa: PTH112
         fsync(descriptor)
 
-    def noted_replace(self, target):
+    def noted_replace(source, target):
         steps.append("replace")
-        return replace(self, target)
+        replace(source, target)
 
     monkeypatch.setattr(os, "fsync", noted_fsync)
-    monkeypatch.setattr(Path, "replace", noted_replace)
+    monkeypatch.setattr(os, "replace", noted_replace)
     write_atomically(path, b"new", 0o600)
     assert steps == ["file", "replace", "folder"]
     assert (path.read_bytes(), path.stat().st_mode & 0o777) == (b"new", 0o600)
@@ -65,6 +64,19 @@ def test_a_file_that_cannot_be_written_stays_as_it_was(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="No space"):
         write_atomically(path, b"new")
     assert (path.read_bytes(), list(tmp_path.iterdir())) == (b"old", [path])
+
+
+def test_the_name_of_the_unfinished_file_is_not_interned(tmp_path, interned):
+    (path := tmp_path / "state.json").write_bytes(b"old")
+    interned.clear()
+    write_atomically(path, b"new")
+    assert interned == []
+
+
+def test_a_name_without_a_folder_is_in_the_current_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_atomically("state.json", b"new")
+    assert [file.name for file in tmp_path.iterdir()] == ["state.json"]
 
 
 def test_a_new_file_has_the_permissions_that_the_umask_leaves(tmp_path):

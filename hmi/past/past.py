@@ -5,9 +5,9 @@ cycle nothing but a share of the processor.
 """
 
 import io
+import os
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple, Self, TypeVar
 
 import cv2
@@ -91,7 +91,7 @@ class Past:
 
         def read(connection: Connection) -> FullRecord:
             record = read_inspection(connection, sequence, self._folder)
-            return replace(record, images=tuple(image for image in record.images if Path(image.path).is_file()))
+            return replace(record, images=tuple(image for image in record.images if os.path.isfile(image.path)))
 
         return await self._read(read)
 

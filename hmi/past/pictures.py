@@ -1,5 +1,6 @@
 """Pictures for the pages: stored images, and the measurement's stages on them."""
 
+import os
 from pathlib import Path
 from typing import NamedTuple
 
@@ -91,17 +92,18 @@ def _stored(record: FullRecord, kind: str, step: int | None) -> StoredImage:
     raise RecordsError(messages.STEP_NOT_KEPT(step=step, number=number, state=state), messages.WHAT_IS_KEPT())
 
 
-def _file(path: Path) -> bytes:
+def _file(path: str) -> bytes:
     try:
-        if path.stat().st_size > LARGEST_IMAGE_BYTES:
-            raise RecordsError(messages.IMAGE_TOO_LARGE(), messages.LOOK_AT_FILE(path=str(path)))
-        return path.read_bytes()
+        if os.stat(path).st_size > LARGEST_IMAGE_BYTES:
+            raise RecordsError(messages.IMAGE_TOO_LARGE(), messages.LOOK_AT_FILE(path=path))
+        with open(path, "rb") as file:
+            return file.read()
     except OSError as error:
         raise RecordsError(messages.IMAGE_GONE(), messages.OLDEST_GO_FIRST()) from error
 
 
 def _picture(image: StoredImage) -> Image:
-    picture = cv2.imdecode(np.frombuffer(_file(Path(image.path)), np.uint8), cv2.IMREAD_COLOR)
+    picture = cv2.imdecode(np.frombuffer(_file(image.path), np.uint8), cv2.IMREAD_COLOR)
     if picture is None:
         raise RecordsError(messages.IMAGE_DAMAGED(), messages.RUN_CHECK())
     return np.asarray(picture, np.uint8)

@@ -227,7 +227,7 @@ def _copy_images(folder: Path, partial: Path) -> tuple[int, tuple[str, ...], lis
     size_bytes, missing, damaged = 0, list[str](), list[str]()
     for sha256, size in wanted.items():
         try:
-            size_bytes += copy_image(image_path(folder, sha256), image_path(partial, sha256), sha256, size)
+            size_bytes += copy_image(Path(image_path(folder, sha256)), Path(image_path(partial, sha256)), sha256, size)
         except FileNotFoundError:
             missing.append(sha256)
         except DamagedError as error:

@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import logging
 import math
+import os
 import queue
 import shutil
 import threading
@@ -47,9 +48,9 @@ class _NotStoredError(StationError):
     """An inspection's images are not stored, for the reason in its message."""
 
 
-def image_path(folder: Path, sha256: str) -> Path:
-    """Return the path of the image whose bytes have this SHA-256."""
-    return folder / FOLDER_NAME / sha256[:2] / f"{sha256}.png"
+def image_path(folder: Path, sha256: str) -> str:
+    """Return the path of the image whose bytes have this SHA-256 (not a `Path`: see `station.atomic_file`)."""
+    return os.path.join(folder, FOLDER_NAME, sha256[:2], f"{sha256}.png")
 
 
 def accepted_is_stored(sequence: int, share: float) -> bool:
@@ -142,13 +143,13 @@ class ImageStore:
             return
         self.results.update({"kept": len(rows)} if rows else {})
 
-    def _write(self, path: Path, content: bytes) -> None:
+    def _write(self, path: str, content: bytes) -> None:
         """Write one durable file; nothing is done if it exists already."""
         if self._stopping.is_set():
             raise _NotStoredError(messages.STATION_ENDED())
-        if path.exists():
+        if os.path.exists(path):
             return
-        path.parent.mkdir(parents=True, exist_ok=True)
+        os.makedirs(os.path.dirname(path), exist_ok=True)
         write_atomically(path, content)
         self.size_bytes += len(content)
 
@@ -167,7 +168,8 @@ class ImageStore:
                 raise _NotStoredError(messages.QUOTA_FULL() if over else messages.DISK_NEARLY_FULL())
             freed_bytes, names = removed
             for name in names:
-                image_path(self._folder, name).unlink(missing_ok=True)
+                with contextlib.suppress(FileNotFoundError):
+                    os.unlink(image_path(self._folder, name))
             self.size_bytes -= freed_bytes
             self.results["removed"] += len(names)
 

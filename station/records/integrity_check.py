@@ -44,7 +44,7 @@ def check_records(folder: Path, proof: Proof = NO_PROOF) -> IntegrityReport:
     missing, damaged = [], []
     for sha256 in wanted:
         try:
-            content = image_path(folder, sha256).read_bytes()
+            content = Path(image_path(folder, sha256)).read_bytes()
         except FileNotFoundError:
             missing.append(sha256)
         except OSError as error:

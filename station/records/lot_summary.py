@@ -182,7 +182,7 @@ def _examples(connection: Any, folder: Path, name: str) -> list[Example]:
         kept = ask(
             "SELECT sha256 FROM images WHERE sequence = ? AND kind = 'step' ORDER BY step DESC LIMIT 1", (row.sequence,)
         ).fetchone()
-        path = image_path(folder, kept[0]) if kept else None
+        path = Path(image_path(folder, kept[0])) if kept else None
         area = ask("SELECT standing FROM inspections WHERE sequence = ?", (row.sequence,)).fetchone()[0]
         found.append(
             Example(

@@ -98,9 +98,7 @@ def read_inspection(connection: Connection, sequence: int, folder: Path) -> Full
         standing=standing,
         published_utc_ms=row.published_utc_ms,
         acknowledged_utc_ms=row.acknowledged_utc_ms,
-        images=tuple(
-            _made(StoredImage, image, path=str(image_path(folder, image.sha256).absolute())) for image in kept
-        ),
+        images=tuple(_made(StoredImage, image, path=image_path(folder.absolute(), image.sha256)) for image in kept),
         images_state=images_state_of(row.images_state),
     )
 

@@ -74,6 +74,7 @@ class Records:
 
     def __init__(self, folder: Path, settings: RecordsSettings, boot: str) -> None:
         self.folder = folder
+        self._files = (folder / FILE_NAME, folder / f"{FILE_NAME}-wal")
         self.notices: tuple[Notice, ...] = ()
         """Findings of the last `open` or `reopen`."""
         self.lost: tuple[int, ...] = ()
@@ -312,8 +313,6 @@ class Records:
     def status(self) -> Status:
         """Return the state of the records; never waits."""
         opened = self._opened
-        path = self.folder / FILE_NAME
-        files = [path, path.with_name(f"{FILE_NAME}-wal")]
         free_bytes = 0
         with contextlib.suppress(OSError):
             free_bytes = shutil.disk_usage(self.folder).free
@@ -324,7 +323,7 @@ class Records:
             queue=opened.writer.waiting if opened else 0,
             images_waiting=opened.images.waiting if opened else 0,
             images=dict(opened.images.results) if opened else {},
-            database_bytes=sum(file.stat().st_size for file in files if file.exists()),
+            database_bytes=sum(file.stat().st_size for file in self._files if file.exists()),
             image_bytes=opened.images.size_bytes if opened else 0,
             free_bytes=free_bytes,
             last_write_age_s=None if written_s is None else time.monotonic() - written_s,

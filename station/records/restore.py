@@ -93,7 +93,7 @@ def _copied(directory: Path, new: Path, manifest: Manifest) -> None:
         wanted = referred(connection)
     for sha256 in wanted.keys() - set(manifest.missing):
         try:
-            copy_image(image_path(directory, sha256), image_path(new, sha256), sha256, wanted[sha256])
+            copy_image(Path(image_path(directory, sha256)), Path(image_path(new, sha256)), sha256, wanted[sha256])
         except FileNotFoundError:
             raise DamagedError(
                 messages.IMAGE_MISSING(path=str(directory), image=sha256), messages.TAKE_ANOTHER()

@@ -41,7 +41,10 @@ def read() -> dict[str, Restarts]:
     """Read the supervisor's counts; empty without a supervisor of ours."""
     name = os.environ.get(RESTARTS_VARIABLE, "")
     try:
-        data = json.loads(Path(name).read_text(encoding="utf-8")) if name else {}
+        if not name:
+            return {}
+        with open(name, encoding="utf-8") as file:  # noqa: PTH123 (once a second: see `station.atomic_file`)
+            data = json.load(file)
         return {
             program: Restarts(total, tuple(times_s), given_up) for program, (total, times_s, given_up) in data.items()
         }

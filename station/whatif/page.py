@@ -133,7 +133,7 @@ def _outline(image: cv2.typing.MatLike, mask: cv2.typing.MatLike, colour: tuple[
 
 def _image(folder: Path, sha256: str) -> cv2.typing.MatLike | None:
     try:
-        data = image_path(folder, sha256).read_bytes()
+        data = Path(image_path(folder, sha256)).read_bytes()
     except OSError:
         return None
     return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)

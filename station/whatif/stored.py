@@ -175,7 +175,7 @@ def _images(
     found: dict[int, list[tuple[int | None, bytes]]] = {}
     for sequence, kind, step, sha256 in rows:
         try:
-            data = image_path(folder, sha256).read_bytes()
+            data = Path(image_path(folder, sha256)).read_bytes()
         except OSError:
             continue
         found.setdefault(sequence, []).append((None if kind == "reference" else step, data))

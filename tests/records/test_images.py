@@ -113,6 +113,27 @@ def test_beyond_the_quota_the_oldest_accepted_go_first_then_the_oldest_rejected(
     scenario(steps)
 
 
+def test_no_name_of_a_later_image_is_interned(opened, scenario, inspected, noise, settled, interned):
+    async def steps():
+        async with opened(images_quota_mb=1) as records:
+
+            async def add():
+                number = await inspected(records, noise(side_px=315))
+                await settled(records)
+                assert len((await records.inspection(number)).images) == 1
+                assert records.status().database_bytes > 0
+
+            for _ in range(5):
+                await add()
+            before = set(interned)
+            for _ in range(3):
+                await add()
+            assert records.status().images == {"kept": 8, "removed": 5}
+            assert set(interned) == before
+
+    scenario(steps)
+
+
 def test_images_larger_than_the_quota_are_dropped_and_it_is_said(opened, scenario, inspected, noise, settled):
     async def steps():
         async with opened(images_quota_mb=1) as records:

@@ -92,7 +92,7 @@ class Performer:
 
 def stepwise(step: Any) -> None:
     """Make every call to the disk a step."""
-    for place, name in ((os, "fsync"), (os, "fchmod"), (Path, "replace"), (tempfile, "mkstemp")):
+    for place, name in ((os, "fsync"), (os, "fchmod"), (os, "replace"), (tempfile, "mkstemp")):
         call = getattr(place, name)
 
         def stepped(*args: Any, _call: Any = call, **kwargs: Any) -> Any:
