@@ -1,6 +1,6 @@
 """Eight hours in one: the whole station at its full pace, and what grows in its processes meanwhile.
 
-Run with `./run bench soak [--minutes 120]`: the twin, the station's processes, the line, three panels and two readers,
+Run with `./run bench soak [--minutes 80]`: the twin, the station's processes, the line, three panels and two readers,
 PostgreSQL and an MQTT broker, with the images at their quota. Every ten seconds each process's memory, descriptors and
 threads are read, the PLC's latency, the cycle's time, the records' space and what waits in the outbox; and, for what
 the machine does meanwhile, the latency of the same server with no station behind it, and the time of a fixed piece of
@@ -30,7 +30,7 @@ from station.errors import StationError
 from station.records.database import FILE_NAME, records_folder
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "soak.md"
-MINUTES = 120.0
+MINUTES = 80.0
 WINDOW_S = 10.0
 _WORK, _WORK_EVERY_S = bytes(1 << 20), 0.2
 """What is hashed as the fixed piece of work, some milliseconds' worth, and how often."""
