@@ -50,6 +50,11 @@ def load(text: str) -> str:
     return next(filter(None, stated.groups())) if stated else ""
 
 
+def section(text: str, row: str) -> str:
+    """Return the first section of a page with a row that begins so: parts made on other days state other loads."""
+    return next(each for each in re.split(r"(?m)^(?=## )", text) if f"\n| {row}" in each)
+
+
 def figure(text: str, what: str, column: str, row: str, *peers: str) -> list[str]:
     """Return what is measured, ours, and its peers' with their names, from a page's text."""
     named = [(name, *place.partition(" @ ")[::2]) for name, _, place in (peer.partition(" = ") for peer in peers)]
@@ -77,7 +82,7 @@ def markdown(runs: dict[str, dict[str, Any]]) -> str:
         stated = load(text) or str(ran.get("load", "not stated"))
         for each in entry.get("figures", ()):
             try:
-                cells = [f"[{name}]({page})", *figure(text, *each), stated]
+                cells = [f"[{name}]({page})", *figure(text, *each), load(section(text, each[2])) or stated]
             except LookupError as error:
                 raise LookupError(f"docs/{page}: {error}") from error
             figures.append(f"| {' | '.join(cells)} |")
