@@ -122,8 +122,8 @@ def summarise(folder: Path, name: str) -> LotSummary:
         held = ask(
             "SELECT coalesce('inspection ' || sequence, 'the lot') || ': ' || reason FROM holds "
             "WHERE released_utc_ms IS NULL "
-            "AND (lot = ?1 OR sequence IN (SELECT sequence FROM inspections WHERE lot = ?1))",
-            (name,),
+            "AND (lot = ? OR sequence IN (SELECT sequence FROM inspections WHERE lot = ?))",
+            (name, name),
         ).fetchall()
         grower = ask("SELECT grower FROM lots WHERE name = ?", (name,)).fetchone()
         return LotSummary(
