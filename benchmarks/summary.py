@@ -4,6 +4,7 @@
 long, is in `benchmarks/runs.json`, which the runner writes.
 """
 
+import contextlib
 import json
 import re
 import tomllib
@@ -50,17 +51,21 @@ def load(text: str) -> str:
     return next(filter(None, stated.groups())) if stated else ""
 
 
-def section(text: str, row: str) -> str:
-    """Return the first section of a page with a row that begins so: parts made on other days state other loads."""
-    return next(each for each in re.split(r"(?m)^(?=## )", text) if f"\n| {row}" in each)
-
-
 def figure(text: str, what: str, column: str, row: str, *peers: str) -> list[str]:
     """Return what is measured, ours, and its peers' with their names, from a page's text."""
     named = [(name, *place.partition(" @ ")[::2]) for name, _, place in (peer.partition(" = ") for peer in peers)]
     columns = {column, *(other for _, _, other in named if other)}
     theirs = [f"{name} {find(text, columns, where, other or column)}" for name, where, other in named]
     return [what, find(text, columns, row, column), "; ".join(theirs)]
+
+
+def section(text: str, *of: str) -> str:
+    """Return a page's section that a figure is in: parts made on other days state other loads; else the whole page."""
+    for each in re.split(r"(?m)^(?=## )", text):
+        with contextlib.suppress(LookupError):
+            figure(each, *of)
+            return each
+    return text
 
 
 def markdown(runs: dict[str, dict[str, Any]]) -> str:
@@ -82,7 +87,7 @@ def markdown(runs: dict[str, dict[str, Any]]) -> str:
         stated = load(text) or str(ran.get("load", "not stated"))
         for each in entry.get("figures", ()):
             try:
-                cells = [f"[{name}]({page})", *figure(text, *each), load(section(text, each[2])) or stated]
+                cells = [f"[{name}]({page})", *figure(text, *each), load(section(text, *each)) or stated]
             except LookupError as error:
                 raise LookupError(f"docs/{page}: {error}") from error
             figures.append(f"| {' | '.join(cells)} |")

@@ -40,9 +40,9 @@ def publish(file: Path, programs: Mapping[str, Restarts]) -> None:
 def read() -> dict[str, Restarts]:
     """Read the supervisor's counts; empty without a supervisor of ours."""
     name = os.environ.get(RESTARTS_VARIABLE, "")
+    if not name:
+        return {}
     try:
-        if not name:
-            return {}
         with open(name, encoding="utf-8") as file:  # noqa: PTH123 (once a second: see `station.atomic_file`)
             data = json.load(file)
         return {

@@ -42,8 +42,8 @@ def test_a_cell_is_found_by_its_row_and_the_columns_of_its_table():
 
 def test_a_part_made_on_another_day_has_its_own_load():
     page = f"# Page\n{PAGE}\n## Another\n\n| where | s |\n|---|---|\n| two | 3 |\n\nLoad 0.5.\n"
-    assert summary.load(summary.section(page, "two")) == "0.5"
-    assert summary.load(summary.section(page, "ours")) == "1.5"
+    assert summary.load(summary.section(page, "time, s", "s", "two")) == "0.5"
+    assert summary.load(summary.section(page, "replies a second", "replies", "ours")) == "1.5"
 
 
 @pytest.mark.parametrize(("row", "column"), [("ours", "p99"), ("theirs", "p99"), ("ours", "p50")])

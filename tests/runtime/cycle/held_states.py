@@ -8,7 +8,6 @@ import asyncio
 import os
 import signal
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -92,7 +91,7 @@ class Performer:
 
 def stepwise(step: Any) -> None:
     """Make every call to the disk a step."""
-    for place, name in ((os, "fsync"), (os, "fchmod"), (os, "replace"), (tempfile, "mkstemp")):
+    for place, name in ((os, "fsync"), (os, "fchmod"), (os, "replace")):
         call = getattr(place, name)
 
         def stepped(*args: Any, _call: Any = call, **kwargs: Any) -> Any:
