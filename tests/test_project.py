@@ -120,9 +120,9 @@ def test_a_python_without_packages_is_refused_before_anything_is_installed(run_s
 
 
 def test_another_python_of_the_machine_goes_on(run_script, monkeypatch):
-    started = []
+    started, this = [], f"python{sys.version_info.major}.{sys.version_info.minor}"
     monkeypatch.setattr(sys, "version_info", (3, 13, 0))
-    monkeypatch.setattr(run_script.shutil, "which", lambda name: sys.executable if name == "python3.11" else None)
+    monkeypatch.setattr(run_script.shutil, "which", lambda name: sys.executable if name == this else None)
     monkeypatch.setattr(run_script.os, "execv", lambda *command: started.append(command) or sys.exit(0))
     monkeypatch.setattr(sys, "argv", ["run", "demo", "--count", "3"])
     with pytest.raises(SystemExit):

@@ -155,7 +155,7 @@ class Evidence:
         more than the measured one, so the area is looked for that much sooner; how far it may differ from the average
         is in the budget. Beyond the last trusted point the area is at least that point's, since it rises.
         """
-        place_mm = closing_mm - self._press.onset_uncertainty_mm / 2
+        place_mm = closing_mm - (self._press.onset_uncertainty_mm or 0.0) / 2
         for before, after in pairwise(self.judged):
             if before.closing_mm <= place_mm <= after.closing_mm and self.bounds(before) and self.bounds(after):
                 found = _between((before, after), place_mm) or (0.0, 0.0)

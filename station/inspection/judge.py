@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from station.inspection.evidence import Evidence, Growth
+from station.inspection.evidence import LOWER_BOUNDS, Evidence, Growth
 from station.inspection.press import Measured, Press
 from station.inspection.sized_limits import SizedLimits, sized_limits
 from station.inspection.uncertainty import Budget
@@ -110,6 +110,8 @@ _DOUBTS = {
     Flag.REFERENCE_MISMATCH: (Reason.REFERENCE_BAD, messages.REFERENCE_MISMATCH),
 }
 """By a flag of a needed step. A confidence that is too small has a message of its own, with its value."""
+_LARGER = {Reason.CUT_BY_BORDER, Reason.LOW_CONFIDENCE}
+"""Reasons of steps whose contact may reach further than was seen."""
 _LATE_START = 0.25
 """Share of the first damage threshold's closing by which the curve may seem to begin after the onset."""
 
@@ -173,10 +175,10 @@ def _case(press: Press, recipe: Recipe) -> "_Case":
         return last
     if recipe.damage.decided_by == "first_trusted":
         return decided[0]
-    # Every trusted one: the first that is not kept. An area that is not trusted at the last is still a lower bound,
-    # unless areas up to it do not rise: then the steps contradict each other, and an earlier limit passes no fruit.
-    not_kept = next((case for case in decided if case.findings), None)
-    return not_kept or (decided[-1] if last.reached and not last.near and not last.falls else last)
+    # Every trusted one: the first that is not kept, which may also be by what a cut or lost edge surely reaches. Where
+    # all are, the last one decides, unless its area may be larger than what was seen and nothing else is in doubt.
+    not_kept = next((case for case in cases if case.findings and (case.decides or case.may_be_over)), None)
+    return not_kept or (decided[-1] if last.reached and last.may_be_larger else last)
 
 
 def _with_limit(recipe: Recipe, limit: AreaThreshold) -> Recipe:
@@ -207,21 +209,38 @@ class _Case:
         return self.evidence.area_at(self.limits.recipe.damage.area[-1].closing_mm) is not None
 
     @property
-    def near(self) -> bool:
-        """Whether a limit may be passed, by whatever was measured."""
-        return any(finding.reason is Reason.NEAR_LIMIT for finding in self.findings)
+    def may_be_over(self) -> bool:
+        """Whether an area that is a lower bound may pass its limit already; what was not seen only adds to it."""
+        return {Reason.NEAR_LIMIT} < self._reasons <= {Reason.NEAR_LIMIT, *_LARGER} and self._doubts <= LOWER_BOUNDS
 
     @property
-    def falls(self) -> bool:
-        """Whether the area does not rise as it has to, by whatever was measured."""
-        return any(finding.reason is Reason.AREA_NOT_RISING for finding in self.findings)
+    def may_be_larger(self) -> bool:
+        """Whether nothing is in doubt but that the contact may reach further than was seen, and the limits are kept.
+
+        An area too small for any fruit, a wrong reference or a saturated image speak against the whole press, and so
+        do areas that do not rise.
+        """
+        threshold = self.limits.recipe.damage.area[-1]
+        area = self.evidence.area_at(threshold.closing_mm)
+        is_fruits = area is not None and area[0] - area[1] >= threshold.least_area_mm2
+        return is_fruits and self._reasons <= _LARGER and self._doubts <= LOWER_BOUNDS | {Flag.LOW_CONFIDENCE}
 
     @property
     def decides(self) -> bool:
         """Whether damage is proven, or the last limit was reached and nothing is in doubt but how near it is."""
         if self.void or any(finding.proves for finding in self.findings):
             return True
-        return self.reached and all(finding.reason is Reason.NEAR_LIMIT for finding in self.findings)
+        return self.reached and self._reasons <= {Reason.NEAR_LIMIT}
+
+    @property
+    def _reasons(self) -> set[Reason]:
+        return {finding.reason for finding in self.findings}
+
+    @property
+    def _doubts(self) -> set[Flag]:
+        """What keeps a needed step from being trusted."""
+        needed = [point for point in self.evidence.needed if point not in self.evidence.excused]
+        return {flag for point in needed for flag in self.evidence.doubts(point)}
 
     @cached_property
     def stopped(self) -> Stop | None:
@@ -294,6 +313,10 @@ def _void(press: Press, limits: SizedLimits) -> Iterator[Finding]:
     if press.onset_mm is None:
         if Reason.NO_CONTACT not in press.interruptions:
             yield Finding(Reason.NO_CONTACT, messages.NOTHING_TOUCHED())
+        return
+    if press.onset_uncertainty_mm is None:
+        why = messages.TOUCHED_AT_FIRST(width_mm=press.onset_mm)
+        yield Finding(Reason.OUT_OF_RANGE, why, press.onset_mm, None, 0.0)
         return
     expected = recipe.expected_width
     if not expected.smallest_mm <= press.onset_mm <= expected.largest_mm:

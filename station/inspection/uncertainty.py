@@ -74,7 +74,7 @@ def budget_at(closing_mm: float, press: Press, limits: SizedLimits) -> Budget:
         Component("repeatability", repeatability_at(closing_mm, rule.repeatability), "", 1.0),
         # The contact began anywhere between the last image without it and the first with it: rectangular. Limits are
         # found with onsets as late as others, so that its middle is in both.
-        Component("onset", rectangular(press.onset_uncertainty_mm), "mm", per_mm),
+        Component("onset", rectangular(press.onset_uncertainty_mm or 0.0), "mm", per_mm),
         Component("gripper", rectangular(press.resolution_mm), "mm", per_mm),
         # An area has the scale twice.
         Component("scale", press.scale_uncertainty, "", 2.0),

@@ -27,6 +27,12 @@ WRONG_WIDTH = define(
     "The fruit is {width_mm} mm wide; {recipe} is meant for {smallest_mm} to {largest_mm} mm.",
     width_mm=Number(1),
 )
+TOUCHED_AT_FIRST = define(
+    "judge.touched_at_first",
+    "The fruit was touched in the first image already, at {width_mm} mm: it is wider than that, and how far it was "
+    "closed upon is not known.",
+    width_mm=Number(1),
+)
 NO_LENGTH = define("judge.no_length", "The PLC gave no length of the fruit, and its limits depend on the length.")
 NO_CLASS = define("judge.no_class", "The PLC gave no size class of the fruit, and its limits depend on the class.")
 LENGTH_UNEXPECTED = define(

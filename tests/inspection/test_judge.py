@@ -642,8 +642,64 @@ def test_every_limit_whose_area_is_trusted_has_to_be_kept(at_2_mm2, at_4_mm2, do
 
 @pytest.mark.parametrize(("last_mm2", "outcome"), [(0, "NO_RESULT"), (20, "NO_RESULT"), (60, "PASS")])
 def test_an_earlier_limit_passes_no_fruit_whose_area_does_not_rise_up_to_the_last(last_mm2, outcome):
-    points = (point(0.0, 4), point(1.0, 15), point(2.0, 30), point(4.0, last_mm2, Flag.UNDECIDED))
+    points = (point(0.0, 4), point(1.0, 15), point(2.0, 30), point(4.0, last_mm2, Flag.LOW_CONFIDENCE))
     assert judge(Press(35.0, 0.4, points), EVERY_TRUSTED).outcome == outcome
+
+
+def by_both_limits(at_2: Measured, at_4: Measured, least_mm2: tuple[float, float] = (0.0, 0.0)) -> str:
+    """The outcome of a strawberry measured at both limits, 50 and 100 mm², and before."""
+    limits = tuple(
+        limit.model_copy(update={"least_area_mm2": least})
+        for limit, least in zip(EVERY_TRUSTED.damage.area, least_mm2, strict=True)
+    )
+    recipe = EVERY_TRUSTED.model_copy(update={"damage": EVERY_TRUSTED.damage.model_copy(update={"area": limits})})
+    between = point(3.0, (at_2.area_mm2 + at_4.area_mm2) / 2)
+    points = (point(0.0, 2), point(1.0, at_2.area_mm2 / 2), at_2, between, at_4)
+    return judge(Press(35.0, 0.4, points), recipe).outcome
+
+
+@pytest.mark.parametrize(
+    ("flags", "outcome"),
+    [
+        ((Flag.LOW_CONFIDENCE,), "PASS"),
+        ((Flag.CUT_BY_BORDER, Flag.LOW_CONFIDENCE), "PASS"),
+        ((Flag.LOWER_BOUND,), "PASS"),
+        ((Flag.SATURATED,), "NO_RESULT"),
+        ((Flag.REFERENCE_MISMATCH, Flag.LOW_CONFIDENCE), "NO_RESULT"),
+        ((Flag.UNDECIDED,), "NO_RESULT"),
+        ((Flag.CUT_BY_BORDER, Flag.SATURATED), "NO_RESULT"),
+    ],
+)
+def test_an_earlier_limit_decides_only_where_the_last_area_may_be_larger_than_was_seen(flags, outcome):
+    assert by_both_limits(point(2.0, 30), point(4.0, 60, *flags)) == outcome
+
+
+def test_an_area_at_the_last_limit_that_is_no_fruits_is_not_judged_by_an_earlier_one():
+    assert by_both_limits(point(2.0, 30), point(4.0, 60), (20.0, 50.0)) == "PASS"
+    assert by_both_limits(point(2.0, 30), point(4.0, 40), (20.0, 50.0)) == "NO_RESULT"
+    assert by_both_limits(point(2.0, 30), point(4.0, 40, Flag.CUT_BY_BORDER), (20.0, 50.0)) == "NO_RESULT"
+
+
+@pytest.mark.parametrize(
+    ("at_2_mm2", "flag", "outcome"),
+    [
+        (55, Flag.LOWER_BOUND, "NO_RESULT"),
+        (49, Flag.CUT_BY_BORDER, "NO_RESULT"),
+        (40, Flag.LOWER_BOUND, "PASS"),
+        (55, Flag.LOW_CONFIDENCE, "PASS"),  # it may as well be smaller
+    ],
+)
+def test_a_cut_or_lost_edge_that_reaches_an_earlier_limit_keeps_the_fruit_from_passing_by_the_last(
+    at_2_mm2, flag, outcome
+):
+    assert by_both_limits(point(2.0, at_2_mm2, flag), point(4.0, 85)) == outcome
+
+
+@pytest.mark.parametrize("growth", [15, 48])
+def test_a_fruit_that_every_image_shows_touched_is_neither_passed_nor_failed(growth):
+    verdict = judge(pressed(growth, onset_uncertainty_mm=None), STRAWBERRY)
+    assert verdict.outcome == "NO_RESULT"
+    assert messages.TOUCHED_AT_FIRST(width_mm=35.0) in [finding.message for finding in verdict.findings]
 
 
 def test_a_recipe_says_when_not_every_limit_decides():

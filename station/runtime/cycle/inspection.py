@@ -142,12 +142,13 @@ class Inspection:
 
     def _latest(self) -> Press:
         """The present press."""
-        onset_mm, sooner_mm, points = self.onset_mm, 0.0, tuple[Measured, ...]()
+        onset_mm, points = self.onset_mm, tuple[Measured, ...]()
+        sooner_mm: float | None = 0.0
         if onset_mm is not None:
             untouched = [seen.step.move.width_mm for seen in self.seen if seen.step.move.width_mm > onset_mm]
             if self.before_onset_mm is not None:
                 untouched.append(self.before_onset_mm)
-            sooner_mm = min(untouched) - onset_mm if untouched else 0.0
+            sooner_mm = min(untouched) - onset_mm if untouched else None
             points = tuple(
                 measured_point(seen.contact, onset_mm - seen.step.move.width_mm, self.mm_per_px) for seen in self.seen
             )

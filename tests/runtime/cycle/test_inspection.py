@@ -66,6 +66,29 @@ def test_what_cannot_be_measured_is_no_result(bench):
     assert "something touches the gel" in " ".join(map(str, explanation))
 
 
+def test_a_fruit_wider_than_the_jaws_where_the_images_begin_is_no_result(bench, monkeypatch):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("strawberry")
+            fruit = replace(draw_fruit(Kind.STRAWBERRY, 3), width_mm=44.0)
+            cell.twin.world.place(fruit)
+            active = cell.station.service.active
+            changes = {"start": "width", "start_width_mm": fruit.width_mm - 2}
+            recipe = active.recipe.model_copy(update={"steps": active.recipe.steps.model_copy(update=changes)})
+            cell.station.service.set_active(type(active).of(recipe))
+            monkeypatch.setattr(cell.station.recipes, "current", lambda active: active)  # the lot begins with this one
+            outcome = await cell.line.inspect()
+            record = await cell.station.service.registry.records.inspection(outcome.sequence)
+            return outcome, record.judged
+
+    outcome, judged = asyncio.run(scenario())
+    assert outcome.outcome == "NO_RESULT"
+    assert Reason.OUT_OF_RANGE in outcome.reasons
+    assert "touched in the first image already" in " ".join(map(str, judged.explanation))
+    assert judged.measures["onset_uncertainty_mm"] is None
+    assert len(judged.curve) <= 2, "it is pressed on by the step that was under way, at most"
+
+
 def test_an_early_stop_ends_the_closing_at_the_next_step_at_most(bench, monkeypatch):
     """The gripper never runs two steps ahead of the measurement."""
 
