@@ -175,9 +175,11 @@ def _case(press: Press, recipe: Recipe) -> "_Case":
         return last
     if recipe.damage.decided_by == "first_trusted":
         return decided[0]
-    # Every trusted one: the first that is not kept, which may also be by what a cut or lost edge surely reaches. Where
-    # all are, the last one decides, unless its area may be larger than what was seen and nothing else is in doubt.
-    not_kept = next((case for case in cases if case.findings and (case.decides or case.may_be_over)), None)
+    # Every trusted one: the first that is not kept. Once the last is reached, one that a cut or lost edge reaches is not
+    # kept either, and one whose own area may be larger than was seen, and nothing else, leaves it to those before it.
+    not_kept = next((case for case in decided if case.findings), None)
+    if not_kept is None and last.reached:
+        not_kept = next((case for case in cases if case.may_be_over), None)
     return not_kept or (decided[-1] if last.reached and last.may_be_larger else last)
 
 
