@@ -4,7 +4,7 @@ Source: Automotive Industry Action Group, Measurement Systems Analysis, 4th edit
 "Analysis of Variance (ANOVA) method", and its appendix A.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
@@ -15,6 +15,9 @@ POOLED_FROM = 0.25
 """An interaction of weaker significance is pooled with the equipment's."""
 SPREAD = 6.0
 """Standard deviations in a variation's span, compared with the tolerance; 99.73 % of a normal distribution."""
+_ROUNDING = 1e-12
+"""Share of the largest value: a smaller difference of means is the computer's rounding (2e-16 of a value), not a
+variation. The variation of identical repeats is 0, whatever the values."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +28,9 @@ class Source:
     sum_of_squares: float
     degrees: int
     f: float | None = None
+    """None if the source is not tested, and where it varies and what it is tested against does not: infinite."""
     p: float | None = None
+    """Significance; None if the source is not tested."""
 
     @property
     def mean_square(self) -> float:
@@ -121,11 +126,12 @@ def _variance(table: npt.NDArray[np.float64]) -> tuple[tuple[Source, ...], bool]
     mean = table.mean()
     of_parts, of_operators = table.mean(axis=(1, 2)), table.mean(axis=(0, 2))
     cells = table.mean(axis=2)
-    between_parts = operators * repeats * float(np.square(of_parts - mean).sum())
-    between_operators = parts * repeats * float(np.square(of_operators - mean).sum())
+    rounding = _ROUNDING * float(np.abs(table).max())
+    between_parts = operators * repeats * _sum_of_squares(of_parts - mean, rounding)
+    between_operators = parts * repeats * _sum_of_squares(of_operators - mean, rounding)
     crossed = cells - of_parts[:, None] - of_operators[None, :] + mean
-    interaction = repeats * float(np.square(crossed).sum())
-    within = float(np.square(table - cells[..., None]).sum())
+    interaction = repeats * _sum_of_squares(crossed, rounding)
+    within = _sum_of_squares(table - cells[..., None], rounding)
     crossed_degrees, within_degrees = (parts - 1) * (operators - 1), parts * operators * (repeats - 1)
     tested = _tested(Source("interaction", interaction, crossed_degrees), Source("", within, within_degrees))
     pooled = tested.p is None or tested.p > POOLED_FROM
@@ -144,10 +150,13 @@ def _variance(table: npt.NDArray[np.float64]) -> tuple[tuple[Source, ...], bool]
     return tuple(sources), pooled
 
 
+def _sum_of_squares(differences: npt.NDArray[np.float64], rounding: float) -> float:
+    return float(np.square(np.where(np.abs(differences) > rounding, differences, 0.0)).sum())
+
+
 def _tested(source: Source, against: Source) -> Source:
-    """Return a source with its F and significance; without them if there is nothing to compare with."""
-    if against.mean_square <= 0:
-        return source
-    f = source.mean_square / against.mean_square
-    p = float(fdtrc(source.degrees, against.degrees, f))
-    return Source(source.name, source.sum_of_squares, source.degrees, f, p)
+    """Return a source with its F and significance; without them where neither of the two varies."""
+    if against.mean_square > 0:
+        f = source.mean_square / against.mean_square
+        return replace(source, f=f, p=float(fdtrc(source.degrees, against.degrees, f)))
+    return replace(source, p=0.0) if source.mean_square > 0 else source

@@ -99,8 +99,44 @@ def test_known_components_are_found_again():
         assert gauge.component(name).sigma == pytest.approx(sigma, rel=tolerance)
 
 
-def test_a_gauge_that_always_says_the_same_has_no_categories():
-    gauge = analyse(np.full((3, 2, 2), 7.0))
+@pytest.mark.parametrize("unit", [1.0, 0.1])
+def test_an_interaction_of_identical_repeats_is_not_repeatability(unit):
+    """Areas in whole units, which hide a finer noise: the components are those with that noise."""
+    rng = np.random.default_rng(0)
+    cells = np.round(100 + 10 * rng.standard_normal((10, 1)) + 6 * rng.standard_normal((10, 3)))
+    identical = unit * np.repeat(cells[..., None], 3, axis=2)
+    gauge, with_noise = (
+        analyse(table, tolerance=40 * unit)
+        for table in (identical, identical + unit * 1e-6 * rng.standard_normal(identical.shape))
+    )
+    tested = {source.name: source for source in gauge.sources}
+    assert (tested["interaction"].f, tested["interaction"].p) == (None, 0)
+    assert not gauge.pooled
+    assert gauge.component("EV").sigma == 0
+    assert gauge.component("INT").sigma > 3 * unit
+    assert [one.name for one in gauge.components] == [one.name for one in with_noise.components]
+    for one, other in zip(gauge.components, with_noise.components, strict=True):
+        assert one.sigma == pytest.approx(other.sigma, abs=1e-3)
+        assert one.tolerance_percent == pytest.approx(other.tolerance_percent, abs=1e-3)
+
+
+def test_identical_repeats_of_operators_who_differ_alike_at_every_part_have_no_interaction():
+    """The means of three repeats are off by the computer's rounding, which is no variation."""
+    parts, operators = np.array([9.1, 10.3, 12.7, 14.9, 10.1]), np.array([0.0, 0.1, 0.2])
+    gauge = analyse(np.repeat((parts[:, None] + operators)[..., None], 3, axis=2))
+    assert gauge.pooled
+    assert gauge.component("EV").sigma == 0
+    assert gauge.component("GRR").sigma == gauge.component("AV").sigma == pytest.approx(0.1)
+    tested = {source.name: source for source in gauge.sources}
+    assert (tested["interaction"].f, tested["interaction"].p) == (None, None)
+    assert (tested["operators"].f, tested["operators"].p) == (None, 0)
+
+
+@pytest.mark.parametrize("area", [0.0, 7.0, 7.1])
+def test_a_gauge_that_always_says_the_same_has_no_categories(area):
+    gauge = analyse(np.full((3, 2, 3), area))
+    assert gauge.pooled
+    assert all((source.f, source.p) == (None, None) for source in gauge.sources)
     assert gauge.component("TV").sigma == 0
     assert gauge.distinct_categories == 0
 

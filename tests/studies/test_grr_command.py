@@ -75,6 +75,26 @@ def test_measurements_of_a_file_are_analysed(measurements: Path, tmp_path: Path)
     assert sorted(path.name for path in out.parent.iterdir()) == ["out"]
 
 
+def test_identical_repeats_are_perfectly_repeatable_and_an_infinite_f_is_no_number(tmp_path: Path):
+    rows = ["part,operator,repeat,area_mm2"]
+    for part, areas in (("a", (80, 86)), ("b", (95, 90)), ("c", (140, 141))):
+        for operator, area in zip("AB", areas, strict=True):
+            rows += [f"{part},{operator},{repeat},{area}" for repeat in (1, 2, 3)]
+    path = tmp_path / "measurements.csv"
+    path.write_text("\n".join(rows) + "\n")
+    found = asked(path, "--tolerance", 50, "--out", tmp_path / "out")
+    assert found.exit_code == 0, found.output
+    text = (tmp_path / "out" / "grr.json").read_text()
+    summary = json.loads(text)
+    assert not summary["interaction_pooled"]
+    assert summary["components"]["EV"]["sigma_mm2"] == 0
+    assert summary["components"]["INT"]["sigma_mm2"] > 3
+    assert not {"Infinity", "NaN"} & set(text.replace(",", " ").split())
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "<td>-</td><td>0.0000</td>" in page
+    assert ">inf<" not in page
+
+
 def test_without_a_tolerance_the_total_variation_judges(measurements: Path, tmp_path: Path):
     found = asked(measurements, "--out", tmp_path / "out")
     assert found.exit_code == 0, found.output
