@@ -29,9 +29,11 @@ def test_the_report_shows_every_picture_and_the_curve_without_a_network(press, a
     widths = page.eval_on_selector_all("img", "pictures => pictures.map(picture => picture.naturalWidth)")
     assert len(widths) == 7
     assert all(width > 0 for width in widths)
-    box = page.locator(".curve svg").first.bounding_box()
+    box = page.locator(".plot svg").first.bounding_box()
     assert box is not None
     assert box["height"] > 100
+    text = page.locator(".plot svg text").first
+    assert text.evaluate("text => getComputedStyle(text).stroke") == "none"
     sources = page.evaluate("performance.getEntriesByType('resource').map(entry => entry.name)")
     assert not [source for source in sources if source.startswith("http")]
 
