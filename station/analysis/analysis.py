@@ -13,14 +13,14 @@ from station.analysis.decoding import Decoded
 from station.analysis.measurement import Measured, Refused, measure_all
 from station.analysis.output import OutputFolder, flag_names
 from station.analysis.pictures import outlined, sheet, stacked, thumbnail
+from station.analysis.press_curve import PressCurve, Step, press_curve
 from station.analysis.presses import Run, runs, singles
 from station.analysis.report import Report, ReportRow, jpeg_uri, render
 from station.analysis.sources import Source
 from station.calibration.model import Calibration
 from station.charts.area_chart import document
 from station.errors import BadInputError
-from station.inspection.curve import Reading, area_curve
-from station.inspection.monotone import wrong_frames
+from station.inspection.curve import Reading
 from station.settings.segmentation import Segmentation
 from station.vision.contact import Contact, Image
 from station.vision.methods import make_method
@@ -59,6 +59,8 @@ class Request:
 class _Summary:
     """Report data of one image, small enough to keep for all images."""
 
+    number: int
+    """In the order given by the user, from 0."""
     row: ReportRow
     contact: Contact
     """Without its mask, which is on the disk, and without the data for the next step."""
@@ -146,6 +148,7 @@ def _summary(item: Measured, scale: Scale, widths_mm: dict[str, float] | None) -
     known_at_mm = None if unknown else width_mm
     bound = "at least " if contact.found and contact.flags & _LOWER_BOUNDS else ""
     return _Summary(
+        number=item.number,
         row=ReportRow(
             image=name,
             picture=jpeg_uri(picture),
@@ -156,6 +159,7 @@ def _summary(item: Measured, scale: Scale, widths_mm: dict[str, float] | None) -
             lower_bound=bool(bound),
             changed_area_mm2=changed_mm2,
             width_mm=width_mm,
+            press=None,
             closing_mm=None,
             confidence=contact.confidence,
             flags=flag_names(item),
@@ -198,7 +202,7 @@ def _write_summaries(
     qualities = [(item.row.image, item.quality) for item in measured if item.quality is not None]
     if qualities:
         output.write_denoising(qualities)
-    chart, rows = _write_curve(output, request, measured)
+    chart, rows = _write_curves(output, request, measured)
     report = Report(
         title=f"Contact areas of {len(measured)} images",
         facts=_facts(request, scale, order),
@@ -212,36 +216,38 @@ def _write_summaries(
     output.write_bytes("report.html", render(report).encode())
 
 
-def _write_curve(
+def _write_curves(
     output: OutputFolder, request: Request, measured: Sequence[_Summary]
 ) -> tuple[Markup | None, list[ReportRow]]:
-    """Write the curve if there are widths, and add the closings to the report's rows."""
-    rows = [item.row for item in measured]
-    by_reading = {id(item.reading): item for item in measured if item.reading is not None}
-    curve = area_curve(item.reading for item in by_reading.values() if item.reading is not None)
-    if not curve.points:
-        return None, rows
-    of_points = [by_reading[id(point.reading)].row for point in curve.points]
-    images = [row.image for row in of_points]
-    points = [point.reading for point in curve.points]
-    wrong = wrong_frames([reading.width_mm for reading in points], [reading.area_mm2 for reading in points])
-    output.write_curve(images, curve, wrong)
-    chart = curve_chart(
-        curve,
-        wrong,
-        f"{request.recipe or 'press'}, method {request.segmentation.method}",
-        changed_mm2=[row.changed_area_mm2 for row in of_points],
-        lower_bounds=[place for place, row in enumerate(of_points) if row.lower_bound],
-    )
+    """Write the presses' curves if there are widths, and add presses and closings to the report's rows."""
+    rows = {item.number: item.row for item in measured}
+    if request.widths_mm is None:
+        return None, list(rows.values())
+    # By `paper` too, which measures images by themselves: an onset is a press's own.
+    order = runs(request.sources, request.widths_mm, sequence=request.sequence)
+    presses = [run for run in order if run.followed]
+    if len(presses) > 1:
+        for press, run in enumerate(presses, start=1):
+            rows |= {number: replace(rows[number], press=press) for number in run.numbers if number in rows}
+    readings = {item.number: item.reading for item in measured}
+    curves = [
+        press_curve(press, [Step(rows[n], reading) for n in run.numbers if (reading := readings.get(n)) is not None])
+        for press, run in enumerate(presses, start=1)
+    ]
+    if not any(each.curve.points for each in curves):
+        return None, list(rows.values())
+    output.write_curves(curves)
+    chart = curve_chart(curves, f"{request.recipe or 'press'}, method {request.segmentation.method}")
     output.write_bytes("curve.svg", document(chart).encode())
-    closing_mm = dict(zip(images, (point.closing_mm for point in curve.points), strict=True))
-    unfit = {images[frame.index] for frame in wrong}
-    return chart, [_on_curve(row, closing_mm[row.image], unfit) if row.image in closing_mm else row for row in rows]
+    on_curve = {row.image: row for each in curves for row in _on_curve(each)}
+    return chart, [on_curve.get(row.image, row) for row in rows.values()]
 
 
-def _on_curve(row: ReportRow, closing_mm: float, unfit: set[str]) -> ReportRow:
-    flags = [*row.flags, "area_does_not_fit_the_other_steps"] if row.image in unfit else row.flags
-    return replace(row, closing_mm=closing_mm, flags=flags)
+def _on_curve(press: PressCurve) -> Iterator[ReportRow]:
+    unfit = {frame.index for frame in press.wrong}
+    for place, (row, point) in enumerate(zip(press.rows, press.curve.points, strict=True)):
+        flags = [*row.flags, "area_does_not_fit_the_other_steps"] if place in unfit else row.flags
+        yield replace(row, closing_mm=point.closing_mm, flags=flags)
 
 
 def _scale(calibration: Calibration | None, height_px: int, width_px: int) -> Scale:

@@ -16,15 +16,15 @@ import numpy as np
 import numpy.typing as npt
 
 from station.analysis.measurement import Measured, Refused
+from station.analysis.press_curve import PressCurve
 from station.errors import BadInputError
-from station.inspection.curve import AreaCurve
 from station.inspection.monotone import WrongFrame
 from station.vision.contact import Contact
 from station.vision.quality import DenoisingQuality
 from station.vocabulary import Flag
 
 RESULT_COLUMNS = ("image", "contact", "area_px", "area_mm2", "centroid_x_px", "centroid_y_px", "flags")
-CURVE_COLUMNS = ("image", "width_mm", "closing_mm", "area_px", "area_mm2", "expected_mm2")
+CURVE_COLUMNS = ("image", "width_mm", "closing_mm", "area_px", "area_mm2", "expected_mm2", "press")
 DETAIL_COLUMNS = ("image", "confidence", "gate", "drift_levels", "changed_area_px")
 _OWN_NAMES = (
     "results.csv",
@@ -151,26 +151,23 @@ class OutputFolder:
         if rows:
             self._write_table("errors.csv", ("image", "error"), rows)
 
-    def write_curve(self, images: Sequence[str], curve: AreaCurve, wrong: Sequence[WrongFrame]) -> None:
-        """Write the area curve.
-
-        Args:
-            images: the images' names in the curve's order.
-            curve: as many points as images.
-            wrong: the frames whose area in mm² does not fit the others; their rows contain the expected area.
-        """
-        expected = {frame.index: _expectation(frame) for frame in wrong}
-        rows = [
-            (
-                image,
-                f"{point.reading.width_mm:g}",
-                f"{point.closing_mm:.3f}",
-                point.reading.area_px,
-                f"{point.reading.area_mm2:.3f}",
-                expected.get(index, ""),
-            )
-            for index, (image, point) in enumerate(zip(images, curve.points, strict=True))
-        ]
+    def write_curves(self, curves: Sequence[PressCurve]) -> None:
+        """Write the presses' area curves; the row of an area that does not fit the others contains the expected one."""
+        rows = []
+        for press in curves:
+            expected = {frame.index: _expectation(frame) for frame in press.wrong}
+            rows += [
+                (
+                    row.image,
+                    f"{point.reading.width_mm:g}",
+                    f"{point.closing_mm:.3f}",
+                    point.reading.area_px,
+                    f"{point.reading.area_mm2:.3f}",
+                    expected.get(place, ""),
+                    press.number,
+                )
+                for place, (row, point) in enumerate(zip(press.rows, press.curve.points, strict=True))
+            ]
         self._write_table("curve.csv", CURVE_COLUMNS, rows)
 
     def write_details(self, contacts: Sequence[tuple[str, Contact]]) -> None:

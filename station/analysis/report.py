@@ -30,6 +30,8 @@ class ReportRow:
     changed_area_mm2: float | None
     """Changed area of the image; None if the method does not measure it."""
     width_mm: float | None
+    press: int | None
+    """Number of its press, from 1; None unless there are several."""
     closing_mm: float | None
     confidence: float | None
     flags: Sequence[str]

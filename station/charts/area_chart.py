@@ -5,6 +5,7 @@ the custom properties that are named there.
 """
 
 from collections.abc import Callable, Sequence
+from math import ceil
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -18,6 +19,10 @@ _LEAST_SHOWN_MM2 = 0.05
 """Less is lost in the one digit behind the decimal sign."""
 _ROOM = 1.04
 """Beyond the largest value, so that its sign is not at the edge."""
+_PRESS_COLOURS = 7
+"""In the style sheet; a further press has the first one's again."""
+_PRESS_COLUMNS = 2
+"""Of the legend of presses, as many as its words allow."""
 
 Mark = Literal["point", "decided", "doubtful", "bound", "wrong"]
 """Sign of one point: measured, the one that decided, doubtful, a lower bound, or one that does not fit the others."""
@@ -34,6 +39,8 @@ class Curve(NamedTuple):
     """mm and mm²."""
     marks: Sequence[Mark] = ()
     """Of the points, in order; none for a line without signs."""
+    press: int = 0
+    """Its number among several presses, from 1: written beside its end, and its colour. 0 for one alone."""
 
 
 class Limit(NamedTuple):
@@ -60,6 +67,8 @@ class Texts(NamedTuple):
     onset: str = ""
     """Beside a line at closing 0; none if empty."""
     legend: Sequence[tuple[Kind | Mark, str]] = ()
+    presses: Sequence[str] = ()
+    """For the legend: each press's words, in the order of their numbers."""
 
 
 class Size(NamedTuple):
@@ -117,6 +126,7 @@ def area_chart(
         parts.append(f'<path class="onset" d="M{at} {top}V{bottom}"/>')
         parts.append(f'<text x="{at + text / 3:.1f}" y="{top + text}">{escape(texts.onset)}</text>')
     parts += [_curve(curve, x, y, text) for curve in curves]
+    parts.append(_press_numbers(curves, x, y, text))
     if early_stop_mm2 is not None:
         at = y(early_stop_mm2)
         parts.append(f'<path class="early" d="M{left} {at}H{right}"/>')
@@ -128,6 +138,8 @@ def area_chart(
     parts += [_limit_name(each, own, x, y, text, f"{texts.limit} {_short(each.area_mm2, number)}") for each in limits]
     parts.append(_legend(texts.legend, left, high, text))
     whole = high + round(1.5 * text * len(texts.legend))
+    parts.append(_press_legend(texts.presses, left, (right - left) / _PRESS_COLUMNS, whole, text))
+    whole += round(1.5 * text * ceil(len(texts.presses) / _PRESS_COLUMNS))
     return Markup(  # noqa: S704 (numbers, our own classes, and escaped texts)
         f'<svg xmlns="http://www.w3.org/2000/svg" class="chart area-chart" viewBox="0 0 {wide} {whole}" role="img" '
         f'font-size="{text}" aria-label="{escape(texts.label)}">{"".join(parts)}</svg>'
@@ -166,7 +178,8 @@ def _curve(curve: Curve, x: Axis, y: Axis, text: int) -> str:
     places = [(x(closing_mm), y(area_mm2)) for closing_mm, area_mm2 in curve.points]
     line = " ".join(f"{at_x:g},{at_y:g}" for at_x, at_y in places)
     signs = (_sign(mark, *place, text / 4) for place, mark in zip(places, curve.marks, strict=False))
-    return f'<polyline class="curve curve-{curve.kind}" points="{line}"/>{"".join(signs)}'
+    drawn = f'<polyline class="curve curve-{curve.kind}" points="{line}"/>{"".join(signs)}'
+    return f'<g class="{_press_class(curve.press)}">{drawn}</g>' if curve.press else drawn
 
 
 def _sign(mark: str, x: float, y: float, r: float) -> str:
@@ -235,4 +248,35 @@ def _legend(legend: Sequence[tuple[Kind | Mark, str]], left: float, high: float,
         else:
             parts.append(f'<path class="curve curve-{kind}" d="M{left} {at:.1f}h{2.4 * text:.1f}"/>')
         parts.append(f'<text x="{left + 3 * text}" y="{at + 0.35 * text:.1f}">{escape(words)}</text>')
+    return "".join(parts)
+
+
+def _press_class(press: int) -> str:
+    return f"press-{(press - 1) % _PRESS_COLOURS + 1}"
+
+
+def _press_numbers(curves: Sequence[Curve], x: Axis, y: Axis, text: int) -> str:
+    """Write each press's number beside the end of its line, one below the other where ends are close."""
+    ends = sorted((y(each.points[-1][1]), x(each.points[-1][0]), each.press) for each in curves if each.press)
+    parts: list[str] = []
+    placed: list[tuple[float, float]] = []
+    for end_y, at_x, press in ends:
+        at_y = max([end_y, *(other_y + text for other_x, other_y in placed if abs(other_x - at_x) < 2 * text)])
+        placed.append((at_x, at_y))
+        parts.append(
+            f'<text class="chart-name {_press_class(press)}" x="{at_x + 0.5 * text:.1f}" '
+            f'y="{at_y + 0.35 * text:.1f}">{press}</text>'
+        )
+    return "".join(parts)
+
+
+def _press_legend(presses: Sequence[str], left: float, column: float, high: float, text: int) -> str:
+    """Write each press's words beside a piece of its line, column by column."""
+    parts, rows = [], ceil(len(presses) / _PRESS_COLUMNS)
+    for place, words in enumerate(presses):
+        x, at = left + place // rows * column, high + (1.5 * (place % rows) + 0.7) * text
+        parts.append(
+            f'<g class="{_press_class(place + 1)}"><path class="curve curve-own" d="M{x:.1f} {at:.1f}h{2 * text}"/></g>'
+            f'<text x="{x + 2.5 * text:.1f}" y="{at + 0.35 * text:.1f}">{escape(words)}</text>'
+        )
     return "".join(parts)

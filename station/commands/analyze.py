@@ -27,7 +27,7 @@ PLACE = click.Path(path_type=Path, readable=False)
 @click.option("--recipe", "recipe_name", metavar="NAME", help="Recipe, by name or file, whose segmentation is used.")
 @click.option("--method", type=click.Choice(["paper", "robust"]), help="Method, in place of the recipe's.")
 @click.option(
-    "--widths", type=PLACE, help="CSV image,width_mm: adds closing and the area curve. The images are one press."
+    "--widths", type=PLACE, help="CSV image,width_mm: the images are steps of presses; adds closing and area curves."
 )
 @click.option("--sequence", is_flag=True, help="The images are the steps of one press, in the order given.")
 @click.option("--unit", metavar="SERIAL", help="The sensor that took the images, whose calibration gives the scale.")

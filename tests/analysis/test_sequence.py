@@ -18,6 +18,7 @@ from station.analysis.sources import Source, list_sources
 from station.settings.recipe import find_recipe
 from station.settings.segmentation import Segmentation
 from station.twin.digit.press import render_press
+from station.twin.fruit import Kind
 from station.vision.contact import Contact, StageSink, contact_from_mask
 from station.vision.methods import make_method
 from station.vision.press import PressTracker
@@ -46,6 +47,18 @@ def folder(pressed, tmp_path: Path) -> Path:
         rows.append(f"step_{number}.png,{width_mm:.3f}")
     (tmp_path / "widths.csv").write_text("\n".join(rows) + "\n")
     return tmp_path
+
+
+def add_press(place: Path, kind: Kind, seed: int) -> Path:
+    """Write another fruit's press as a second folder of images, of the same sensor, and its rows into the widths."""
+    frames = place / "second"
+    frames.mkdir()
+    press = render_press(kind, seed, CLOSINGS_MM)
+    with (place / "widths.csv").open("a") as table:
+        for number, (image, width_mm) in enumerate(zip(press.frames, press.widths_mm, strict=True)):
+            cv2.imwrite(str(frames / f"second_{number}.png"), image)
+            table.write(f"second_{number}.png,{width_mm:.3f}\n")
+    return frames
 
 
 def read_table(path: Path) -> list[dict[str, str]]:
@@ -132,6 +145,43 @@ def test_each_video_is_a_press_of_its_own(pressed, folder, analyze):
     assert same(rows[:7], contacts)
     assert same(rows[7:], contacts)
     assert "2 presses of 7, 7 images" in (out / "report.html").read_text()
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("strawberry", 5), ("blueberry", 6)])
+def test_presses_of_one_table_of_widths_have_a_curve_each_as_if_analysed_alone(folder, analyze, kind, seed):
+    second = add_press(folder, kind, seed)
+    for out, images in (("both", [folder / "frames", second]), ("alone", [second])):
+        done = analyze(
+            "--reference", folder / "reference", "--recipe", "blueberry", "--widths", folder / "widths.csv",
+            "--out", folder / out, *images,
+        )  # fmt: skip
+        assert (done.returncode, done.stderr) == (0, "")
+    rows = read_table(folder / "both" / "curve.csv")
+    assert [(row["press"], row["image"]) for row in rows] == [
+        *(("1", f"step_{number}.png") for number in range(7)),
+        *(("2", f"second_{number}.png") for number in range(7)),
+    ]
+    for press in (rows[:7], rows[7:]):
+        touched = [float(row["closing_mm"]) for row in press if float(row["area_mm2"])]
+        assert touched[0] == 0
+    assert {row["expected_mm2"] for row in rows} == {""}
+    alone = read_table(folder / "alone" / "curve.csv")
+    assert list(alone[0]) == [
+        "image", "width_mm", "closing_mm", "area_px", "area_mm2", "expected_mm2", "press",
+    ]  # fmt: skip
+    assert alone == [row | {"press": "1"} for row in rows[7:]]
+    both, one = ((folder / out / "report.html").read_text() for out in ("both", "alone"))
+    assert "does not fit the other steps" not in both
+    assert (both.count(">press 1, width "), both.count(">press 2, width ")) == (7, 7)
+    assert ">press 1, width " not in one
+    onsets = [next(row["width_mm"] for row in press if row["closing_mm"] == "0.000") for press in (rows[:7], rows[7:])]
+    plot = (folder / "both" / "curve.svg").read_text()
+    assert [plot.count(f">press {number}: onset at {mm} mm<") for number, mm in enumerate(onsets, start=1)] == [1, 1]
+    assert plot.count('<polyline class="curve curve-own"') == 2
+    plot = (folder / "alone" / "curve.svg").read_text()
+    assert f">onset at {onsets[1]} mm<" in plot
+    assert plot.count('<polyline class="curve curve-own"') == plot.count('<polyline class="curve curve-changed"') == 1
+    assert 'class="press-1"' not in plot
 
 
 def source(name: str, place: int = -1, *, video: bool = False, refused: bool = False) -> Source:
@@ -243,6 +293,43 @@ def test_paper_measures_each_image_by_itself(tmp_path: Path, monkeypatch):
     )
     assert analyze(request, lambda: None).measured == 3
     assert stub.calls == [(50, None), (100, None), (120, None)]
+
+
+@pytest.mark.parametrize("method", ["paper", "robust"])
+def test_each_closing_of_the_jaws_has_its_own_curve_by_either_method(tmp_path: Path, monkeypatch, method):
+    """Three presses in one folder, the second without a contact, and the third with an area that does not fit."""
+    levels, widths_mm = (0, 50, 100, 0, 0, 60, 120, 90), (40, 39, 38, 40, 39, 40, 39, 38)
+    for number, level in enumerate(levels):
+        cv2.imwrite(str(tmp_path / f"step_{number}.png"), np.full((64, 64, 3), level, np.uint8))
+    monkeypatch.setattr("station.analysis.analysis.make_method", lambda *_: Stub())
+    request = Request(
+        sources=list_sources([tmp_path]).sources,
+        references=[Decoded(np.zeros((64, 64, 3), np.uint8), ())],
+        reference_name="reference",
+        segmentation=Segmentation(method=method),
+        recipe=None,
+        widths_mm={f"step_{number}.png": float(width_mm) for number, width_mm in enumerate(widths_mm)},
+        out=tmp_path / "out",
+        stages=False,
+        jobs=1,
+    )
+    assert analyze(request, lambda: None).measured == 8
+    rows = read_table(tmp_path / "out" / "curve.csv")
+    assert [(row["image"], row["press"], row["closing_mm"], bool(row["expected_mm2"])) for row in rows] == [
+        ("step_0.png", "1", "-1.000", False),
+        ("step_1.png", "1", "0.000", False),
+        ("step_2.png", "1", "1.000", False),
+        ("step_5.png", "3", "0.000", False),
+        ("step_6.png", "3", "1.000", True),
+        ("step_7.png", "3", "2.000", False),
+    ]
+    report = (tmp_path / "out" / "report.html").read_text()
+    assert report.count("area does not fit the other steps") == 1
+    assert report.count(">press 2, width ") == 2
+    plot = (tmp_path / "out" / "curve.svg").read_text()
+    assert [plot.count(f">press {words}<") for words in ("1: onset at 39 mm", "2: no onset", "3: onset at 40 mm")] == [
+        1, 1, 1,
+    ]  # fmt: skip
 
 
 def test_rows_come_in_the_order_given_and_none_is_lost_where_the_run_ends_early(tmp_path: Path):

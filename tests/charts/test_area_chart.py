@@ -1,6 +1,7 @@
 """The chart of area over closing: everything within it, in its place, and text as text."""
 
 import xml.etree.ElementTree as ET
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -48,6 +49,31 @@ def test_every_sign_has_its_shape_and_the_legend_its_words():
     assert len(shapes(chart, "curve curve-own")) == 2
     words = [each.text for each in ET.fromstring(chart).iter(f"{SVG}text")]
     assert words[-5:] == [text for _, text in legend]
+
+
+def test_presses_have_a_line_a_colour_and_a_number_each_and_numbers_do_not_hide_each_other():
+    ends = (40.0, 40.5, 41.0, 80.0, 40.2, 81.0, 79.0, 20.0)
+    curves = [
+        Curve("own", [(0.0, 1.0), (4.0, end)], ("point", "point"), number) for number, end in enumerate(ends, start=1)
+    ]
+    words = [f"press {number}: <onset>" for number in range(1, 9)]
+    chart = area_chart(curves, (), Texts("x", presses=words), size=Size(720, 400, 14))
+    drawn = [each for each in ET.fromstring(chart).iter(f"{SVG}g") if each.find(f"{SVG}polyline") is not None]
+    assert [each.get("class") for each in drawn] == [f"press-{number}" for number in (1, 2, 3, 4, 5, 6, 7, 1)]
+    assert all(len(each.findall(f"{SVG}circle")) == 2 for each in drawn)
+    numbers = {
+        each.text: float(each.attrib["y"])
+        for each in ET.fromstring(chart).iter(f"{SVG}text")
+        if each.get("class", "").startswith("chart-name press-")
+    }
+    assert list(numbers) == ["6", "4", "7", "3", "2", "5", "1", "8"], "as the lines end, from above"
+    places = list(numbers.values())
+    assert all(lower - upper >= 14 - 0.11 for upper, lower in pairwise(places)), "rounded to a tenth"
+    legend = [each for each in ET.fromstring(chart).iter(f"{SVG}text") if (each.text or "").startswith("press ")]
+    assert [each.text for each in legend] == words
+    height = float(ET.fromstring(chart).attrib["viewBox"].split(" ")[3])
+    assert all(400 < float(each.attrib["y"]) < height for each in legend)
+    assert len({(each.attrib["x"], each.attrib["y"]) for each in legend}) == 8
 
 
 def test_limits_of_two_recipes_differ_and_the_least_area_is_drawn():
