@@ -127,6 +127,15 @@ def test_the_result_of_another_fruit_is_not_used(plc):
     assert (plc.block["done"], plc.block["discarded"], plc.written("acknowledged_sequence")) == (False, 1, 4)
 
 
+def test_a_fruit_laid_in_the_place_of_one_taken_away_does_not_pass_on_its_result(plc):
+    plc.accepted()
+    plc.scan(inspect=False)
+    plc.scan(5, inspect=True, fruit_id=8)
+    plc.station.show(5, 7)
+    plc.scan(5)
+    assert (plc.block["done"], plc.block["passed"]) == (True, False)
+
+
 def test_ids_over_half_their_range(plc):
     plc.accepted(fruit_id=65_535)
     plc.station.show(5, 65_535)

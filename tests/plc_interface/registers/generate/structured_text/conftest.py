@@ -464,3 +464,8 @@ def make_plc_for_examples() -> type[Plc]:
 @pytest.fixture
 def library() -> Library:
     return Library(data_types(), function_block(), example())
+
+
+@pytest.fixture
+def station() -> Station:
+    return Station()

@@ -1,7 +1,7 @@
 """The function block, run by an evaluator against a station that does what the test says."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from plc_interface.registers.bits import WRITE_KEY
@@ -95,6 +95,36 @@ def test_a_simulated_result_passes_only_where_it_may(plc):
     plc.station.show(5, 7, result_flags=flags)
     plc.scan(accept_simulated=True)
     assert plc.block["passed"]
+
+
+@pytest.mark.parametrize("when", ["before the answer", "before the result", "with the result"])
+@pytest.mark.parametrize("for_scans", [1, 30])
+def test_a_fruit_laid_in_the_place_of_one_taken_away_does_not_pass_on_its_result(plc, when, for_scans):
+    if when == "before the answer":
+        plc.scan(3)
+        plc.scan(inspect=True)
+        plc.scan(for_scans, inspect=False)
+        plc.scan(inspect=True)
+        plc.station.set(accepted_trigger_id=7)
+        plc.station.flags("online", "trigger_acknowledged", "inspecting")
+        plc.scan()
+    else:
+        plc.accepted()
+    if when == "before the result":
+        plc.scan(for_scans, inspect=False)
+        plc.scan(inspect=True, fruit_id=8)
+    plc.station.show(5, 7)
+    if when == "with the result":
+        plc.scan(inspect=False)
+        assert not plc.block["passed"]
+    plc.scan(inspect=True)
+    assert (plc.block["done"], plc.block["passed"]) == (True, False)
+    plc.station.flags("online", "trigger_ready")
+    plc.scan(inspect=False)
+    plc.accepted(fruit_id=9)
+    plc.station.show(6, 9)
+    plc.scan()
+    assert plc.block["passed"], "the next fruit, which stayed"
 
 
 @pytest.mark.parametrize("phase", ["idle", "triggered", "accepted", "ended", "changing recipe"])
@@ -369,16 +399,20 @@ def play(plc, what, number, sequence):
 
 
 @given(STEPS)
+@example([("inspect", 1), ("accept", 1), ("release", 1), ("inspect", 2), ("show", 1)])
 @settings(max_examples=30, deadline=None)
 def test_whatever_comes_only_the_asked_fruits_own_whole_result_passes(make_plc_for_examples, steps):
     plc = make_plc_for_examples()
     plc.scan(3)
+    block, in_place = plc.block, False
     for sequence, (what, number) in enumerate(steps, start=1):
+        was_busy = block["busy"]
         play(plc, what, number, sequence)
         plc.scan()
-        block = plc.block
+        in_place = what != "release" and (in_place or (block["busy"] and not was_busy))
         if block["passed"]:
             result = block["result"]
+            assert in_place, "inspect was high in each scan since its rising edge"
             assert block["done"]
             assert block["alive"]
             assert plc.inputs["inspect"]

@@ -60,6 +60,36 @@ def test_the_example_runs_one_fruit(library):
     assert program["let_pass"] is False
 
 
+def test_the_example_diverts_a_fruit_laid_in_the_place_of_one_taken_away(library, station):
+    program = library.unit("PRG_FruitStationExample")
+
+    def scan(scans=1, **inputs):
+        for _ in range(scans):
+            library.now_s += 0.01
+            station.beat()
+            program(received=station.words, exchange_ok=True, line_running=True, **inputs)
+
+    def accepted(trigger_id):
+        scan(3, fruit_in_place=False)
+        scan(fruit_in_place=True)
+        station.set(accepted_trigger_id=trigger_id)
+        station.flags("online", "trigger_acknowledged", "inspecting")
+        scan(2)
+
+    accepted(1)
+    scan(30, fruit_in_place=False)
+    scan(5, fruit_in_place=True)
+    station.show(41, 1)
+    for _ in range(100):
+        scan()
+        assert not program["let_pass"]
+    station.flags("online", "trigger_ready")
+    accepted(3)
+    station.show(42, 3)
+    scan()
+    assert program["let_pass"]
+
+
 @pytest.mark.parametrize("text", [data_types(), function_block(), example(), configuration()])
 def test_the_text_is_portable(text):
     assert text.isascii()
