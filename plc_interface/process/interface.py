@@ -89,11 +89,16 @@ class Interface:
         self._image.commit({"writer_ipv4": _ipv4(peer)})
 
     def feed(self, event: ev.Event) -> None:
-        """Run one step: journal first, then the registers in one slice, then everything else."""
+        """Run one step: outputs, then the journal, then the registers in one slice, then everything else."""
         epoch = self._state.journal.epoch
         self._state, actions = step(self._state, event, self._settings)
         if self._state.journal.epoch != epoch:
             self._before_reset = (self._statistics.bad_requests, self._statistics.refused_connections)
+        # An outcome that the journal has is not forwarded again after a restart. So the output gets it first: a kill in
+        # between has it forwarded twice, which the output ignores; in the other order the reject would be lost.
+        for action in actions:
+            if isinstance(action, do.ForwardOutcome):
+                self._output.publish(action.outcome)
         for action in actions:
             if isinstance(action, do.SaveJournal):
                 self._journal.write(action.journal, durable=action.durable)
@@ -120,8 +125,6 @@ class Interface:
         match action:
             case do.Log(text=text, warning=warning):
                 log.log(logging.WARNING if warning else logging.INFO, "%s", text)
-            case do.ForwardOutcome(outcome=outcome):
-                self._output.publish(outcome)
             case do.ClearFaults():
                 self._output.acknowledge_faults()
             case do.RequestCommand(command=command, argument=argument):
