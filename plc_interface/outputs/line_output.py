@@ -54,7 +54,7 @@ class NoOutput:
 
 
 class RejectGate:
-    """Reject gate: diverts everything that is not PASS, at the count at which it reaches the gate.
+    """Reject gate: diverts every fruit that is not surely good, at the count at which it reaches the gate.
 
     An order is repeated after a loss of the gate, the bus or this process, as long as its count is ahead: the gate
     takes a repeated order for the same one, and does not actuate at a count that is past.
@@ -63,6 +63,7 @@ class RejectGate:
     def __init__(self, settings: CanSettings, folder: Path) -> None:
         """Restore the pending rejects of the run before, from the journal's folder."""
         self._io, self._distance = LineIo(settings), settings.distance_counts
+        self._real = settings.real_bus
         self._file = PendingRejectFile(folder)
         self._due = self._file.read()
         self._rejects: set[asyncio.Task[None]] = set()
@@ -83,11 +84,16 @@ class RejectGate:
         await self._io.stop()
 
     def publish(self, outcome: Outcome) -> None:
-        """Order a reject actuation for what is not PASS. An outcome may come again after a restart."""
-        if outcome.outcome != "PASS" and outcome.sequence not in self._due:
+        """Order a reject actuation for what may not go on. An outcome may come again after a restart."""
+        if not self._may_go_on(outcome) and outcome.sequence not in self._due:
             self._due[outcome.sequence] = at_count = self._io.count_at_gate(outcome.encoder)
             self._file.write(self._due)
             self._order(outcome.sequence, at_count)
+
+    def _may_go_on(self, outcome: Outcome) -> bool:
+        """Return whether it is a sure PASS, as for the function block; a simulated one is for the twin's gate only."""
+        sure = outcome.outcome == "PASS" and not outcome.late and outcome.area_mm2 is not None
+        return sure and not (outcome.simulated and self._real)
 
     def _order(self, sequence: int, at_count: int) -> None:
         pending = asyncio.create_task(self._divert(sequence, at_count), name=f"shot {sequence}")
@@ -121,7 +127,7 @@ class RejectGate:
 
     @property
     def ready(self) -> bool:
-        """True if what is not PASS would be diverted; else no inspection is started."""
+        """True if a fruit that may not go on would be diverted; else no inspection is started."""
         return self._io.ready
 
     def encoder_count(self) -> int | None:

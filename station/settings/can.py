@@ -150,6 +150,11 @@ class CanSettings(Settings):
         le=255,
     )
 
+    @property
+    def real_bus(self) -> bool:
+        """True if the nodes may be real ones; on every other bus they are the twin's."""
+        return self.interface == "socketcan" and not self.channel.startswith("vcan")
+
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
         if len({self.station_node, self.gate_node, self.encoder_node}) < 3:

@@ -14,7 +14,6 @@ from station.twin.faults import CommonFault, FaultBoard
 _TICK_S = 0.005
 _GARBAGE_S = 0.05
 _SHOWN = 8
-_REAL_BUS = "socketcan"
 
 
 class LineNodes:
@@ -34,7 +33,7 @@ class LineNodes:
         Raises:
             OSError: the bus cannot be had, or is a real one.
         """
-        if self._settings.interface == _REAL_BUS and not self._settings.channel.startswith("vcan"):
+        if self._settings.real_bus:
             raise OSError(f"CAN {self._settings.channel} is a real bus, where the twin has no business; take vcan0")
         try:
             for node in self._nodes:

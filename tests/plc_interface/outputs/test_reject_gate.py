@@ -1,10 +1,12 @@
 """Outcomes become shots of the gate, over losses of the gate, the bus and the interface."""
 
-from types import SimpleNamespace
+import asyncio
+from typing import Any
 
 import pytest
 
 from plc_interface.outputs.line_output import NoOutput, RejectGate, make_output
+from station.channel.line import Outcome
 from station.messages import can as messages
 from station.settings.can import CanSettings
 from station.twin.faults import CommonFault
@@ -12,9 +14,10 @@ from station.twin.faults import CommonFault
 LEASE_S = 40.0
 
 
-def outcome(sequence, name, encoder):
-    """What the gate looks at."""
-    return SimpleNamespace(sequence=sequence, outcome=name, encoder=encoder)
+def outcome(sequence, name, encoder, **changes):
+    """What the gate looks at; PASS is a sure one."""
+    measured: dict[str, Any] = {"area_mm2": 12.3, "late": False, "simulated": False}
+    return Outcome.model_construct(sequence=sequence, outcome=name, encoder=encoder, **(measured | changes))
 
 
 @pytest.fixture
@@ -65,6 +68,41 @@ def test_what_is_not_pass_is_shot_into_the_rejects_and_pass_is_not(gated):
         assert rig.gate.faults == ()
 
     gated(scenario)
+
+
+@pytest.mark.parametrize(
+    "unsure", [{"simulated": True}, {"late": True}, {"area_mm2": None}], ids=["simulated", "late", "no area"]
+)
+def test_a_pass_that_is_not_sure_is_shot_by_a_real_gate(tmp_path, unsure):
+    async def scenario():
+        gate = RejectGate(CanSettings(enabled=True, interface="socketcan", channel="can0"), tmp_path)
+        gate.publish(outcome(1, "PASS", 0))
+        gate.publish(outcome(2, "PASS", 0, **unsure))
+        assert set(gate._due) == {2}
+        await gate.stop()
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(
+    "bus",
+    [
+        {"interface": "udp_multicast"},
+        {"interface": "virtual", "channel": "line"},
+        {"interface": "socketcan", "channel": "vcan0"},
+    ],
+    ids=lambda bus: bus["interface"],
+)
+def test_the_twins_gate_lets_a_simulated_pass_go_on(tmp_path, bus):
+    async def scenario():
+        gate = RejectGate(CanSettings(enabled=True, **bus), tmp_path)
+        gate.publish(outcome(1, "PASS", 0, simulated=True))
+        gate.publish(outcome(2, "PASS", 0, simulated=True, area_mm2=None))
+        gate.publish(outcome(3, "FAIL", 0, simulated=True))
+        assert set(gate._due) == {2, 3}
+        await gate.stop()
+
+    asyncio.run(scenario())
 
 
 def test_an_outcome_that_comes_again_is_one_shot(gated):
