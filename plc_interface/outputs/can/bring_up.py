@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import can
 import canopen
-from canopen.objectdictionary import ObjectDictionaryError
+from canopen.objectdictionary import ObjectDictionary, ObjectDictionaryError
 from canopen.pdo.base import PdoMap
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
@@ -43,19 +43,35 @@ class Pdo(NamedTuple):
     event_timer_ms: int
 
 
-def make_gate(network: canopen.Network, settings: CanSettings) -> Node:
+class DataSheets(NamedTuple):
+    """The objects of both nodes, by their data sheets and node ids."""
+
+    gate: ObjectDictionary
+    encoder: ObjectDictionary
+
+
+def read_data_sheets(settings: CanSettings) -> DataSheets:
+    """Parse both data sheets; call it before the event loop serves requests, which would wait for it."""
+    return DataSheets(
+        canopen.import_od(str(GATE_EDS), settings.gate_node), canopen.import_od(str(ENCODER_EDS), settings.encoder_node)
+    )
+
+
+def make_gate(network: canopen.Network, settings: CanSettings, sheets: DataSheets) -> Node:
     """Make the reject gate's node on this network; replaces an earlier one."""
-    return _make(network, settings, "gate_node", messages.GATE, str(GATE_EDS))
+    return _make(network, settings, "gate_node", messages.GATE, sheets.gate)
 
 
-def make_encoder(network: canopen.Network, settings: CanSettings) -> Node:
+def make_encoder(network: canopen.Network, settings: CanSettings, sheets: DataSheets) -> Node:
     """Make the line encoder's node on this network; replaces an earlier one."""
-    return _make(network, settings, "encoder_node", messages.ENCODER, str(ENCODER_EDS))
+    return _make(network, settings, "encoder_node", messages.ENCODER, sheets.encoder)
 
 
-def _make(network: canopen.Network, settings: CanSettings, setting: str, name: Definition, eds: str) -> Node:
+def _make(
+    network: canopen.Network, settings: CanSettings, setting: str, name: Definition, objects: ObjectDictionary
+) -> Node:
     number = getattr(settings, setting)
-    remote = network.add_node(number, eds)
+    remote = network.add_node(number, objects)
     remote.sdo.RESPONSE_TIMEOUT = settings.answer_timeout_s
     return Node(remote, number, name(node=number), f"can.{setting}")
 

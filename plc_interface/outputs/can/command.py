@@ -34,7 +34,10 @@ def check_can(config: Path | None) -> None:
     faulty: list[Message] = []
     try:
         click.echo(f"{click.style('ok      ', fg='green')}{described(settings)}")
-        for node in (bring_up.make_gate(link.network, settings), bring_up.make_encoder(link.network, settings)):
+        sheets = bring_up.read_data_sheets(settings)
+        gate = bring_up.make_gate(link.network, settings, sheets)
+        encoder = bring_up.make_encoder(link.network, settings, sheets)
+        for node in (gate, encoder):
             try:
                 found = _check_node(link, node, settings)
             except LineIoError as error:

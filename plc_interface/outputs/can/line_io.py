@@ -51,7 +51,7 @@ class LineIo:
     """The station's end of the bus. Make, start, stop and use it on one loop."""
 
     def __init__(self, settings: CanSettings) -> None:
-        self._settings = settings
+        self._settings, self._sheets = settings, bring_up.read_data_sheets(settings)
         self._counters: Counter[str] = Counter()
         self._rejects = PendingRejects(self._counters, settings.tolerance_counts)
         self._emergencies: dict[tuple[int, int], Message] = {}
@@ -280,8 +280,8 @@ class LineIo:
 
     async def _bring_up(self, link: CanLink) -> None:
         settings = self._settings
-        gate = bring_up.make_gate(link.network, settings)
-        encoder = bring_up.make_encoder(link.network, settings)
+        gate = bring_up.make_gate(link.network, settings, self._sheets)
+        encoder = bring_up.make_encoder(link.network, settings, self._sheets)
         for node in (gate, encoder):
             await self._until(
                 link, lambda node=node: self._alive(link, node.number), bring_up.no_heartbeat(node, settings)

@@ -1,6 +1,7 @@
 """From an open bus to two operational nodes, and what is said where it does not get there."""
 
 import pytest
+from canopen.objectdictionary import eds
 
 from plc_interface.outputs.can.line_io import LineIo
 from station.messages import can as messages
@@ -55,6 +56,28 @@ def test_a_node_that_is_not_right_is_named_and_taken_once_it_is(on_bus, fault, s
         await rig.until(lambda: rig.io.ready)
         assert rig.io.bus_faults == ()
         assert rig.io.counters["bring_up_failures"] >= 1
+
+    on_bus(scenario)
+
+
+def test_no_session_parses_a_data_sheet_on_the_loop(on_bus, monkeypatch):
+    """On that loop the registers are served too."""
+
+    async def scenario(rig):
+        parsed, parse = [], eds.import_eds
+
+        def noted(sheet, node):
+            parsed.append(sheet)
+            return parse(sheet, node)
+
+        monkeypatch.setattr(eds, "import_eds", noted)
+        await rig.ready()
+        rig.io.renew_health(0)
+        await rig.until(lambda: not rig.nodes.gate.operational)
+        await rig.ready()
+        assert rig.io.counters["bring_ups"] == 2
+        assert rig.nodes.gate.operational
+        assert parsed == []
 
     on_bus(scenario)
 
