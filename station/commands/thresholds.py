@@ -13,7 +13,7 @@ from station.records.marks import Mark, read_marked
 from station.settings.configuration import load_configuration
 from station.settings.recipe import Recipe, find_recipe, recipe_files
 from station.settings.recipe_text import with_values
-from station.whatif.limits import Costs, rate_interval
+from station.whatif.limits import Costs, least_area_at, rate_interval
 from station.whatif.marks import read_marks
 from station.whatif.proposal import Proposal, figures_of, proposals
 from station.whatif.proposal_page import lines_of, page_of
@@ -139,6 +139,10 @@ def _draft(recipe: Recipe, best: Proposal, name: str, folder: Path | None) -> tu
     if limits[chosen].closing_mm != best.closing_mm:
         changes[f"damage.area[{chosen}].closing_mm"] = best.closing_mm
         comments[f"damage.area[{chosen}].closing_mm"] = f"{marked}, where they are told apart at the least cost"
+        least = round(least_area_at(recipe, best.closing_mm), 1)
+        if least != limits[chosen].least_area_mm2:
+            changes[f"damage.area[{chosen}].least_area_mm2"] = least
+            comments[f"damage.area[{chosen}].least_area_mm2"] = "from those before, as the area goes with the closing"
     if chosen and recipe.damage.decided_by == "first_trusted":
         changes["damage.decided_by"] = "every_limit"
         comments["damage.decided_by"] = "what is proposed decides on every fruit"

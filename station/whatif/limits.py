@@ -45,7 +45,7 @@ class MarkedFruit:
 
     good: bool
     passes_from_mm2: float
-    """The least limit by which it passes, at its own size; infinite if none does."""
+    """The least limit by which it passes, at its own size; infinite if none does that a recipe may have."""
     area_mm2: float | None
     """The area itself; None if the closing was not reached."""
     length_mm: float | None
@@ -89,7 +89,7 @@ def marked_fruit(press: Press, recipe: Recipe, closing_mm: float, *, good: bool,
         return None
     area = evidence.area_at(closing_mm)
     if area is not None:
-        passes = judge(press, _without_limits(recipe, closing_mm)).outcome == "PASS"
+        passes = judge(press, _with_largest_limits(recipe, closing_mm)).outcome == "PASS"
         return MarkedFruit(good, sum(area) if passes else math.inf, area[0], limits.length_mm)
     if early_stop(press, recipe) is None:
         return None
@@ -194,6 +194,17 @@ def fewest_fruit(rate: float) -> int:
     return math.ceil(math.log((1 - CONFIDENCE) / 2) / math.log(1 - rate))
 
 
+def least_area_at(recipe: Recipe, closing_mm: float) -> float:
+    """Return the least area of a recipe at any closing, mm², for a fruit of the reference length.
+
+    The area goes with the closing, so it is on the line from one limit's to the next, before the first from no area at
+    the onset. Beyond the last it stays: how the area rises there is not known, and it is no smaller.
+    """
+    limits = recipe.damage.area
+    closings, areas = [each.closing_mm for each in limits], [each.least_area_mm2 for each in limits]
+    return float(np.interp(closing_mm, [0.0, *closings], [0.0, *areas]))
+
+
 def _with_open_limit(recipe: Recipe, closing_mm: float) -> Recipe:
     """Return the recipe with its earlier limits and growth, and an area at a closing that nothing is over."""
     open_limit = {"closing_mm": closing_mm, "area_mm2": LARGEST_AREA_MM2}
@@ -202,10 +213,14 @@ def _with_open_limit(recipe: Recipe, closing_mm: float) -> Recipe:
     return recipe.model_copy(update={"damage": recipe.damage.model_copy(update={"area": area})})
 
 
-def _without_limits(recipe: Recipe, closing_mm: float) -> Recipe:
-    """Return the recipe without limits for a fruit whose measurement is reliable up to a closing."""
-    last = recipe.damage.area[-1]
-    area = (last.model_copy(update={"closing_mm": closing_mm, "area_mm2": LARGEST_AREA_MM2}),)
+def _with_largest_limits(recipe: Recipe, closing_mm: float) -> Recipe:
+    """Return the recipe with the largest limits that one may have, for the area at one closing only."""
+    one = {
+        "closing_mm": closing_mm,
+        "area_mm2": LARGEST_AREA_MM2,
+        "least_area_mm2": least_area_at(recipe, closing_mm),
+    }
+    area = (recipe.damage.area[-1].model_copy(update=one),)
     damage = {"area": area, "growth_mm2_per_mm": _LARGEST_GROWTH_MM2_PER_MM}
     stop = {"area_mm2": LARGEST_AREA_MM2, "growth_mm2_per_mm": _LARGEST_GROWTH_MM2_PER_MM}
     return recipe.model_copy(

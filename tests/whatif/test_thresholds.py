@@ -24,6 +24,7 @@ from station.whatif.limits import (
     errors,
     exponent_of,
     fewest_fruit,
+    least_area_at,
     marked_fruit,
     rate_interval,
 )
@@ -104,19 +105,36 @@ class TestWhatAPressSays:
         )
         return Press(35.0, 0.2, points, interruptions, FruitSize(length_mm=45.4))
 
-    def test_the_least_limit_is_where_the_judge_begins_to_pass_it(self):
-        one = marked_fruit(self.press(), self.RECIPE, 3.0, good=True, draft=self.RECIPE)
+    @pytest.mark.parametrize(
+        ("limit", "areas_mm2", "area_mm2"),
+        [(1, (8.0, 50.0, 70.0, 90.0), 90.0), (0, (8.0, 33.6, 56.0, 92.0), pytest.approx(56.0, abs=1.0))],
+        ids=["3 mm", "1.9 mm"],
+    )
+    def test_the_least_limit_is_where_the_judge_begins_to_pass_it(self, limit, areas_mm2, area_mm2):
+        press, threshold = self.press(areas_mm2), self.RECIPE.damage.area[limit]
+        one = marked_fruit(press, self.RECIPE, threshold.closing_mm, good=True, draft=self.RECIPE)
         assert one is not None
-        assert one.area_mm2 == 90.0
+        assert one.area_mm2 == area_mm2
         assert one.length_mm == 45.4
 
         def by(limit_mm2):
-            area = (self.RECIPE.damage.area[-1].model_copy(update={"area_mm2": limit_mm2}),)
+            area = (threshold.model_copy(update={"area_mm2": limit_mm2}),)
             damage = self.RECIPE.damage.model_copy(update={"area": area})
-            return judge(self.press(), self.RECIPE.model_copy(update={"damage": damage})).outcome
+            return judge(press, self.RECIPE.model_copy(update={"damage": damage})).outcome
 
         assert by(one.passes_from_mm2 + 0.01) == "PASS"
         assert by(one.passes_from_mm2 - 0.01) != "PASS"
+
+    def test_the_least_area_goes_with_the_closing_from_limit_to_limit(self):
+        closings = (0.95, 1.9, 2.45, 3.0, 12.0)
+        assert [least_area_at(self.RECIPE, each) for each in closings] == pytest.approx([12.5, 25.0, 38.5, 52.0, 52.0])
+
+    def test_a_limit_that_no_recipe_may_have_is_none(self):
+        """Of a small fruit's large area: for a fruit of the reference length it is beyond what a recipe may say."""
+        press = replace(self.press((8.0, 60.0, 100.0, 150.0)), onset_mm=22.0, size=FruitSize(length_mm=21.0))
+        one = marked_fruit(press, self.RECIPE, 3.0, good=True, draft=self.RECIPE)
+        assert one is not None
+        assert math.isinf(one.passes_from_mm2)
 
     def test_what_the_judge_doubts_passes_by_no_limit(self):
         one = marked_fruit(self.press(flags=(Flag.CUT_BY_BORDER,)), self.RECIPE, 3.0, good=True, draft=self.RECIPE)
@@ -261,6 +279,32 @@ def test_no_comment_of_the_draft_is_of_a_value_before(orchard, station, tmp_path
         f"exponent: {recipe.damage.size.exponent} # regression over these fruit; {marked}",
         f"area_mm2: {recipe.early_stop.area_mm2} # the last limit",
     ]
+
+
+def test_a_limit_at_another_closing_has_the_least_area_of_there(orchard, station, tmp_path, monkeypatch):
+    """Good and bad fruit differ at 1.5 mm, where both show less than the least area at 3 mm, and are alike at 3 mm."""
+    (tmp_path / "site").mkdir()
+    file = tmp_path / "site" / "raspberry.yaml"
+    shipped = (Path(__file__).parents[2] / "recipes" / "raspberry.yaml").read_text()
+    file.write_text(shipped.replace("result_closings_mm: [3,", "result_closings_mm: [1.5, 3,"))
+    monkeypatch.setenv("STATION_RECIPES_FOLDER", str(tmp_path / "site"))
+
+    def press(number: int, area_mm2: float) -> Press:
+        areas = ((0.0, 2.0), (0.75, area_mm2 / 2), (1.5, area_mm2), (2.25, 46.0), (3.0, 60.0 + number % 5))
+        return Press(24.0, 0.1, tuple(Measured(closing, each, round(each * 1100), 0.9) for closing, each in areas))
+
+    good = [press(number, 20.0 + number % 4) for number in range(20)]
+    bad = [press(number, 38.0 + number % 3) for number in range(8)]
+    made = replace(orchard, recipe=load_recipe(file)).store([*good, *bad])
+    for word, some in (("good", made[:20]), ("bad", made[20:])):
+        assert station("records", "mark", *some, word)[0] == 0
+    proposed = tmp_path / "proposed.yaml"
+    code, told = station("thresholds", "--recipe", "raspberry", "--out", tmp_path / "out", "--draft", proposed)
+    assert (code, "mm² at 1.5 mm" in told) == (0, True), told
+    assert "good fruit rejected by the proposed recipe: 0 of 20" in told
+    (area,) = load_recipe(proposed).damage.area
+    assert (area.closing_mm, area.least_area_mm2) == (1.5, 15.5)
+    assert 23 < area.area_mm2 < 38
 
 
 @pytest.mark.parametrize(
