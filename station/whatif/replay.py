@@ -105,8 +105,8 @@ def measured_otherwise(own: Recipe, draft: Recipe) -> bool:
         return True
     if before.method == "paper":
         return before.paper != after.paper
-    loose = {"least_confidence": 0.0}  # the judge's own, also of a stored confidence
-    return before.robust.model_copy(update=loose) != after.robust.model_copy(update=loose)
+    # The least confidence too: it is no matter of the judge's alone, but decides what an image's contact is drawn from.
+    return before.robust != after.robust
 
 
 def _judged(

@@ -89,6 +89,7 @@ def test_a_curve_that_was_stopped_early_does_not_tell_what_would_have_come(orcha
             messages.PRESSES_OTHERWISE(fields="gripper, imaging"),
         ),
         ({"segmentation__robust__gate_ratio": 4.0}, messages.IMAGES_NOT_KEPT()),
+        ({"segmentation__robust__least_confidence": 0.3}, messages.IMAGES_NOT_KEPT()),
     ],
 )
 def test_what_no_stored_curve_can_tell_is_not_guessed(orchard, changed, changes, why):

@@ -67,8 +67,8 @@ def test_a_draft_with_another_segmentation_measures_the_stored_images_again(insp
     assert "measured again" not in told
     assert json.loads((out / "summary.json").read_text())["measured_again"] == 0
 
-    told, out = whatif("same_measured", least_confidence=0.0)
-    assert "measured again" not in told, "it only judges a stored confidence otherwise"
+    told, out = whatif("less_confidence", least_confidence=0.0)
+    assert "1 measured again in their stored images" in told, "a contact is drawn otherwise where confidence is lacking"
 
     with reading(records_folder(home)) as connection:
         found = connection.exec_driver_sql("SELECT sha256 FROM images WHERE kind = 'step' AND step = 1").scalar()
