@@ -11,7 +11,7 @@ from typing import Any
 from station.errors import BadInputError
 from station.messages import recipes as messages
 from station.recipe_store.difference import described_differences
-from station.recipe_store.files import locked, read_folder, write_back
+from station.recipe_store.files import check_unique, locked, read_folder, write_back
 from station.recipe_store.history import Person
 from station.recipe_store.reader import BASE
 from station.recipe_store.recipe_state import RecipeState, ValidFile
@@ -26,6 +26,8 @@ from station.settings.recipe_text import upgraded_text, with_values
 from station.settings.recipe_versions import content_sha256, parse_recipe
 
 _SHORTEST_BASE = 8
+_IMPORT = "import.yaml"
+"""Name of an imported text for messages."""
 
 
 class RecipeEditor:
@@ -42,13 +44,15 @@ class RecipeEditor:
             base: content hash, or its beginning, of the version that the editor has seen; empty for the present one.
 
         Raises:
-            BadInputError: the recipe would be invalid; the file is unchanged.
+            BadInputError: the recipe would be invalid, or another file has its name or PLC number; the file is
+                unchanged.
             ConflictError: the file is another version.
             RecipeStoreError: the file cannot be written.
         """
         with self._editing(name) as file:
             self._check_base(file, base)
             text, recipe = with_values(file.text, changes, str(file.path))
+            check_unique(file.path, text, str(file.path))
             self._put(file, text, recipe, "recipe.edited", person)
         return self._store.state(name)
 
@@ -60,11 +64,12 @@ class RecipeEditor:
             base: as for `edit`; empty for the one that the text names.
 
         Raises:
-            BadInputError: the recipe is invalid, or neither text nor caller names the base version.
+            BadInputError: the recipe is invalid, another file has its name or PLC number, or neither text nor caller
+                names the base version.
             ConflictError: the file was changed since it was exported.
             RecipeStoreError: the file cannot be written.
         """
-        recipe = parse_recipe(text, "import.yaml")
+        recipe = parse_recipe(text, _IMPORT)
         named = BASE.search(text)
         base = base or (named[1] if named else "")
         body = BASE.sub("", text, count=1)
@@ -75,11 +80,13 @@ class RecipeEditor:
                 path = self._sites() / f"{recipe.name}.yaml"
                 if path.exists():
                     raise RecipeStoreError(messages.FILE_IN_THE_WAY(file=str(path)))
+                check_unique(path, text, _IMPORT)
                 self._put(ValidFile(path, "", recipe), body, recipe, "recipe.imported", person)
             else:
                 if not base:
                     raise BadInputError(messages.NO_BASE(recipe=recipe.name))
                 self._check_base(file, base)
+                check_unique(file.path, text, _IMPORT)
                 self._put(file, body, recipe, "recipe.imported", person)
         return self._store.state(recipe.name)
 
@@ -87,7 +94,7 @@ class RecipeEditor:
         """Put a revision's text, or else the approved one's, back into the file; store the present text as a backup.
 
         Raises:
-            BadInputError: there is none.
+            BadInputError: there is none, or another file has its name or PLC number.
             RecipeStoreError: the file cannot be written.
         """
         with locked(self._home):
@@ -98,6 +105,7 @@ class RecipeEditor:
                 raise BadInputError(messages.NONE_APPROVED(recipe=name))
             good = {file.recipe.name: file for file in read_folder(self._sites()).found}
             path = good[name].path if name in good else self._sites() / f"{name}.yaml"
+            check_unique(path, wanted.text, path.name)
             self._put(ValidFile(path, "", wanted.recipe), wanted.text, wanted.recipe, "recipe.reverted", person)
         return self._store.state(name)
 

@@ -3,7 +3,7 @@
 import fcntl
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
@@ -14,8 +14,9 @@ from station.messages import settings as texts
 from station.recipe_store.recipe_state import ValidFile
 from station.recipe_store.revision import RecipeStoreError
 from station.settings.problems import Problem, SettingsError, shortened_file
-from station.settings.recipe import check_recipes, recipe_files
+from station.settings.recipe import UNIQUE, check_recipes, load_recipe, recipe_files
 from station.settings.recipe_versions import parse_recipe
+from station.settings.yaml_loader import parse_document
 
 BACKUPS = "recipe_backups"
 _LOCK = "recipes.lock"
@@ -56,6 +57,28 @@ def read_folder(folder: Path | None) -> Folder:
         if path.stem not in good
     }
     return Folder(tuple(found), broken, tuple(problems))
+
+
+def check_unique(path: Path, text: str, source: str) -> None:
+    """Check that no other file of the folder has the name or PLC number of the recipe to be written to `path`.
+
+    Raises:
+        SettingsError: one has.
+    """
+    recipe, document = parse_recipe(text, source), parse_document(text.encode(), source)
+    problems = []
+    for other in recipe_files(path.parent):
+        if other == path:
+            continue
+        with suppress(SettingsError):  # an invalid one clashes with nothing
+            found = load_recipe(other)
+            problems += [
+                Problem(*document.locate((field,)), texts.RECIPE_TWICE(value=str(value), file=shortened_file(other)))
+                for field in UNIQUE
+                if (value := getattr(found, field)) == getattr(recipe, field)
+            ]
+    if problems:
+        raise SettingsError(problems)
 
 
 @contextmanager

@@ -19,6 +19,8 @@ from station.settings.yaml_loader import read_document
 __all__ = ["Checked", "Recipe", "check_recipes", "find_recipe", "load_recipe", "load_recipes", "recipe_files"]
 
 SUFFIXES = (".yaml", ".yml")
+UNIQUE = ("name", "plc_number")
+"""Values by which a recipe is chosen: of two files with the same one, neither is used."""
 APPROVED_NAME = "approved.json"
 """Beside the shipped recipes: the hashes by which the distribution approves them, so that a change is noticed."""
 
@@ -132,7 +134,7 @@ def check_recipes(files: Iterable[Path]) -> Checked:
         except SettingsError as error:
             problems += error.problems
     clashing: set[Path] = set()
-    for field in ("name", "plc_number"):
+    for field in UNIQUE:
         first: dict[str | int, Path] = {}
         for path, recipe in recipes.items():
             value = getattr(recipe, field)

@@ -133,6 +133,34 @@ def test_revert_puts_the_approved_text_back_and_keeps_what_stood_there(begun, st
     assert "file: approved" in station("recipes", "list")[1]
 
 
+def test_what_would_break_another_recipes_file_is_refused_and_not_written(begun, station, does, site, tmp_path):
+    gooseberry = tmp_path / "gooseberry.yaml"
+    gooseberry.write_text((site / "blueberry.yaml").read_text().replace("name: blueberry", "name: gooseberry"))
+    does("Ida", "edit", "raspberry", "--set", "plc_number=9")
+    does("Ida", "edit", "strawberry", "--set", "plc_number=3")
+    exported = tmp_path / "strawberry.yaml"
+    assert station("recipes", "export", "strawberry", "--out", exported)[0] == 0
+    exported.write_text(exported.read_text().replace("plc_number: 3", "plc_number: 2"))
+
+    def state():
+        told = station("audit", "show")[1]
+        return {file.name: file.read_bytes() for file in site.iterdir()}, told, station("recipes", "list")[1]
+
+    before, clash = state(), "plc_number: expected one recipe with {}, but {} has it too"
+    for arguments, number, other in (
+        (("import", gooseberry), 2, "blueberry"),
+        (("import", exported), 2, "blueberry"),
+        (("edit", "strawberry", "--set", "plc_number=2"), 2, "blueberry"),
+        (("revert", "raspberry"), 3, "strawberry"),
+    ):
+        code, told = station("recipes", *arguments, "--who", "Ida", "--reason", "x")
+        assert (code, clash.format(number, site / f"{other}.yaml") in told) == (2, True), told
+        assert state() == before
+    code, told = station("recipes", "edit", "strawberry", "--set", "name=blueberry", "--who", "Ida", "--reason", "x")
+    assert (code, f"name: expected one recipe with blueberry, but {site / 'blueberry.yaml'} has it" in told) == (2, True)
+    assert state() == before
+
+
 def test_two_recipes_never_share_the_plcs_number(begun, station, does, site):
     (site / "raspberry.yaml").unlink()
     does("Ida", "edit", "blueberry", "--set", "plc_number=3")
