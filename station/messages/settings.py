@@ -126,6 +126,15 @@ NO_RESULT_CLOSING = define(
     value=Number(),
 )
 CLOSING = define("settings.closing", "{closing_mm}")
+JUDGED_ON_ONE_STEP = define(
+    "settings.judged_on_one_step",
+    "expected another step before this closing, a multiple of {step_mm} mm from {from_mm} to below {below_mm} mm: no "
+    "fruit passes by one image alone (make steps.step_mm smaller or the closing larger), got {value}",
+    step_mm=Number(),
+    from_mm=Number(),
+    below_mm=Number(),
+    value=Number(),
+)
 STOP_BELOW_AREA = define(
     "settings.stop_below_area",
     "expected no less than the largest damage threshold, {limit_mm2} mm², got {value}",

@@ -11,6 +11,12 @@ from station.settings.model import Settings, setting
 from station.settings.problems import Path, WantedError
 from station.settings.segmentation import Segmentation
 
+_LIGHT_TOUCH = 0.5
+"""Share of a limit's closing from which the judge takes its steps into account: `LIGHT_TOUCH` of `inspection.evidence`,
+which no settings import."""
+_HALF_COUNT_MM = 0.2
+"""By so much a step may go further than asked for: the gripper goes to the nearest count, of 85 mm / 227 = 0.37 mm."""
+
 
 def _integer(value: object) -> object:
     """Refuse true and 1.0, which pydantic accepts for the choice 1, even if it is strict."""
@@ -262,6 +268,7 @@ class Recipe(Settings):
             if threshold.closing_mm not in self.steps.result_closings_mm:
                 expected = messages.NO_RESULT_CLOSING(closings=closings, value=threshold.closing_mm)
                 wrong.append((("damage", "area", index, "closing_mm"), expected))
+        wrong += self._judged_on_one_step()
         largest_mm2 = max(threshold.area_mm2 for threshold in self.damage.area)
         if self.early_stop.area_mm2 < largest_mm2:
             expected = messages.STOP_BELOW_AREA(limit_mm2=largest_mm2, value=self.early_stop.area_mm2)
@@ -270,3 +277,25 @@ class Recipe(Settings):
             limit, given = self.damage.growth_mm2_per_mm, self.early_stop.growth_mm2_per_mm
             wrong.append((("early_stop", "growth_mm2_per_mm"), messages.STOP_BELOW_GROWTH(limit=limit, value=given)))
         return self.accepted(*wrong)
+
+    def _judged_on_one_step(self) -> list[tuple[Path, Message]]:
+        """Find the limits that the judge would hold against one step only: it shows no onset, so no fruit would pass.
+
+        A limit is judged by the steps from a light touch's end, a share of the first closing that is judged with it, to
+        the first at its closing or beyond; so one step has to be before it. Not covered: a gripper's count may make
+        the only step before it shorter than asked for, and then a light touch.
+        """
+        wrong: list[tuple[Path, Message]] = []
+        area, step_mm = self.damage.area, self.steps.step_mm
+        together = self.damage.decided_by == "every_limit"
+        for index, threshold in enumerate(area):
+            if together and index < len(area) - 1:
+                continue
+            from_mm = _LIGHT_TOUCH * (area[0] if together else threshold).closing_mm
+            below_mm = threshold.closing_mm - _HALF_COUNT_MM
+            if not any(from_mm <= number * step_mm < below_mm for number in range(1, self.steps.number + 1)):
+                expected = messages.JUDGED_ON_ONE_STEP(
+                    step_mm=step_mm, from_mm=from_mm, below_mm=round(below_mm, 6), value=threshold.closing_mm
+                )
+                wrong.append((("damage", "area", index, "closing_mm"), expected))
+        return wrong

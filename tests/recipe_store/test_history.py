@@ -157,7 +157,8 @@ def test_what_would_break_another_recipes_file_is_refused_and_not_written(begun,
         assert (code, clash.format(number, site / f"{other}.yaml") in told) == (2, True), told
         assert state() == before
     code, told = station("recipes", "edit", "strawberry", "--set", "name=blueberry", "--who", "Ida", "--reason", "x")
-    assert (code, f"name: expected one recipe with blueberry, but {site / 'blueberry.yaml'} has it" in told) == (2, True)
+    assert code == 2
+    assert f"name: expected one recipe with blueberry, but {site / 'blueberry.yaml'} has it too" in told
     assert state() == before
 
 

@@ -1,16 +1,24 @@
 """Recipes: what is wrong is said with file, line, field and what was expected; the shipped ones are good."""
 
 import json
+import math
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from station.errors import BadInputError
+from station.inspection.evidence import LIGHT_TOUCH
+from station.inspection.judge import early_stop, judge
+from station.inspection.press import Measured, Press
 from station.messages import settings as messages
+from station.settings import recipe_model
+from station.settings.gripper import GripperCalibration
 from station.settings.problems import Problem, SettingsError
 from station.settings.recipe import (
     Recipe,
@@ -28,6 +36,10 @@ ALIKE = "expected a word that all YAML programs read alike, got"
 CLOSING = "a number above 0 and at most 50 mm"
 NUMBER = "write a number of at most 18 decimal digits without exponent and leading zeros, or"
 PRINTABLE = "expected printable characters: no control characters, none that turn the direction of text"
+ONE_STEP = (
+    "expected another step before this closing, a multiple of 1 mm from 0.5 to below {below_mm} mm: no fruit passes by "
+    "one image alone (make steps.step_mm smaller or the closing larger), got {got}"
+)
 
 # What is changed in the small recipe, by regular expression, and what has to be said then.
 BAD = {
@@ -206,6 +218,21 @@ BAD = {
         r"- closing_mm: 8",
         "- closing_mm: 4",
         ["25: damage.area[1].closing_mm: expected more than the threshold before, got 4"],
+    ),
+    "judged on one step": (
+        r"\[4, 8\](?s:(.*))    - closing_mm: 4\n.*\n(.*)- closing_mm: 8",
+        r"[1]\1\2- closing_mm: 1",
+        [f"23: damage.area[0].closing_mm: {ONE_STEP.format(below_mm=0.8, got=1)}"],
+    ),
+    "limits judged on one step together": (
+        r"\[4, 8\](?s:(.*))- closing_mm: 4(?s:(.*))- closing_mm: 8",
+        r"[1, 1.1]\1- closing_mm: 1\2- closing_mm: 1.1",
+        [f"25: damage.area[1].closing_mm: {ONE_STEP.format(below_mm=0.9, got=1.1)}"],
+    ),
+    "each limit judged by itself": (
+        r"\[4, 8\](?s:(.*))damage:(?s:(.*))- closing_mm: 4",
+        r"[1, 8]\1damage:\n  decided_by: every_trusted\2- closing_mm: 1",
+        [f"24: damage.area[0].closing_mm: {ONE_STEP.format(below_mm=0.8, got=1)}"],
     ),
     "early stop before damage": (
         r"area_mm2: 160\n  growth_mm2_per_mm: 40",
@@ -528,6 +555,47 @@ class TestFinding:
             find_recipe("plum", tmp_path)
         assert str(caught.value).splitlines()[1:] == str(its_own.value).splitlines()
         assert f"{broken}:1: schema_version: expected 1, got nothing" in str(caught.value)
+
+
+def test_a_light_touch_and_a_count_are_as_the_judge_and_the_gripper_have_them():
+    assert recipe_model._LIGHT_TOUCH == LIGHT_TOUCH
+    assert GripperCalibration().mm_per_count / 2 <= recipe_model._HALF_COUNT_MM
+
+
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_by_every_recipe_that_is_accepted_a_fruit_can_pass(small, data):
+    """A straight curve under the limits, each step up to half a count of the gripper further than asked for."""
+    tenths = st.integers(1, 40)
+    step_mm, closings = data.draw(st.integers(4, 20)) / 10, sorted(data.draw(st.sets(tenths, min_size=1, max_size=3)))
+    values = parse_document(small.encode(), "f").value
+    number = math.ceil(closings[-1] / 10 / step_mm)
+    values["steps"] |= {
+        "step_mm": step_mm,
+        "number": number,
+        "closing_limit_mm": 50,
+        "result_closings_mm": [closing / 10 for closing in closings],
+        "stop_when_decided": data.draw(st.booleans()),
+    }
+    values["damage"] = {
+        "area": [{"closing_mm": closing / 10, "area_mm2": 200} for closing in closings],
+        "decided_by": data.draw(st.sampled_from(["every_limit", "first_trusted", "every_trusted"])),
+        "growth_mm2_per_mm": 500,
+    }
+    values["early_stop"] = {"area_mm2": 260, "growth_mm2_per_mm": 1000}
+    try:
+        recipe = Recipe.model_validate_json(json.dumps(values))
+    except ValidationError:
+        return
+    further = st.floats(0, GripperCalibration().mm_per_count / 2)
+    at_mm = [0.0, *(step * step_mm + data.draw(further) for step in range(1, number + 1))]
+    points = tuple(Measured(each, 20 * each, round(20_000 * each), 0.9) for each in at_mm)
+    press = Press(25.0, 0.0, points)
+    for taken in range(1, len(points) + 1):
+        press = replace(press, points=points[:taken])
+        if early_stop(press, recipe) is not None:
+            break
+    assert judge(press, recipe).outcome == "PASS"
 
 
 VALUES = st.one_of(
