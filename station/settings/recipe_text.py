@@ -11,7 +11,8 @@ from station.settings.problems import shortened
 from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import parse_recipe, upgrade
 
-_PART = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)|\[(\d{1,3})\]|(\d{1,3})")
+_PART = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)|\[(\d{1,3})\]|(\d{1,3})", re.ASCII)
+_PATH = re.compile(r"[A-Za-z_]\w*(\.([A-Za-z_]\w*|\d{1,3})|\[\d{1,3}\])*", re.ASCII)
 
 
 def with_values(
@@ -72,6 +73,8 @@ def _set(values: Any, path: str, value: Any) -> None:
 
 def _place(values: Any, path: str) -> tuple[Any, Any]:
     """The structure that holds a value, and the value's key there."""
+    if not _PATH.fullmatch(path):  # what is not understood may be what names another value, as the minus of [-1]
+        raise KeyError(path)
     parts = [int(match[2] or match[3]) if match[1] is None else match[1] for match in _PART.finditer(path)]
     for part in parts[:-1]:
         values = values[part]

@@ -86,6 +86,12 @@ def test_a_bad_edit_leaves_the_file_as_it_was(begun, station, site):
         f"{LIMIT}=NO": "write",
         "early_stop.area_mm2=5": "no less than the largest damage threshold",
         "damage.area[7].area_mm2=5": "expected the path of a value",
+        "damage.area[-1].area_mm2=113": "damage.area[-1].area_mm2: expected the path of a value",
+        "damage area 0 area_mm2=113": "damage area 0 area_mm2: expected the path of a value",
+        "damage.area[0]area_mm2=113": "expected the path of a value",
+        "damage.area[0].area_mm2.=113": "expected the path of a value",
+        "damage..area[0].area_mm2=113": "expected the path of a value",
+        "=113": "expected the path of a value",
         "nonsense": "expected PATH=VALUE",
     }.items():
         code, said = station("recipes", "edit", "strawberry", "--set", change, "--who", "Ida", "--reason", "x")
