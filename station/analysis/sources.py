@@ -11,6 +11,8 @@ from natsort import natsorted, ns
 
 from station.analysis.decoding import SUFFIXES, Decoded, decode_file, printable_name
 from station.errors import BadInputError
+from station.vision.median import median_image
+from station.vision.working import working_image
 
 VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mpeg"})
 _MOST_REFERENCE_FRAMES = 32
@@ -80,11 +82,16 @@ def load_references(place: Path) -> list[Decoded]:
     """Load the untouched gel: one image, or the images of a folder or video, of which the first 32 are used.
 
     Raises:
-        BadInputError: one of them cannot be read, or they differ in size.
+        BadInputError: one of them cannot be read, they differ in size, or they are black.
     """
     loaded = [source.load() for source in list_sources([place]).sources[:_MOST_REFERENCE_FRAMES]]
     if len({decoded.image.shape for decoded in loaded}) > 1:
         raise BadInputError(f"{place}: the reference images differ in size; take them from one sensor and mode")
+    if not working_image(median_image([decoded.image for decoded in loaded])).any():
+        raise BadInputError(
+            f"{printable_name(place)}: the reference is black, so no change of its light can be measured; take it with "
+            "the sensor's light on"
+        )
     return loaded
 
 

@@ -242,6 +242,22 @@ def test_a_bad_reference_is_refused_before_anything_is_written(press, analyze, t
     assert not out.exists()
 
 
+@pytest.mark.parametrize("method", ["robust", "paper"])
+def test_a_black_reference_is_refused_before_anything_is_written(press, analyze, tmp_path, method):
+    """Also one whose few bright pixels are gone in the median."""
+    frames, out = tmp_path / "black", tmp_path / "out"
+    frames.mkdir()
+    for number in range(3):
+        frame = np.zeros_like(cv2.imread(str(press.reference)))
+        frame[0, number] = 255
+        cv2.imwrite(str(frames / f"{number}.png"), frame)
+    done = analyze("--reference", frames, "--method", method, "--out", out, press.folder / "frame_9.png")
+    assert done.returncode == 2
+    assert f"{frames}: the reference is black" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not out.exists()
+
+
 def test_an_earlier_result_is_never_mixed_with_a_new_one(press, analyze, tmp_path):
     out = tmp_path / "out"
     arguments = ("--reference", press.reference, "--method", "paper", "--out", out, press.folder / "frame_9.png")
