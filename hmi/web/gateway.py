@@ -41,8 +41,8 @@ class Gateway:
         self._client: ChannelClient | None = None
         self._polling: asyncio.Task[None] | None = None
         self._polled: asyncio.Future[None] | None = None
-        self._known: tuple[str, int | None] | None = None
-        """The station's start and last fruit of `last` and `recent`."""
+        self._known: tuple[str, int] | None = None
+        """The station's start and number of changes that `last` and `recent` are of."""
         self.state: PanelState | None = None
         """The last answer; None before the first."""
         self.heard_s: float | None = None
@@ -118,7 +118,7 @@ class Gateway:
             with contextlib.suppress(ChannelError):
                 asked = GetPanelState(flooded_by=self.flooded_by())
                 state = await self.request(asked, PanelState, deadline_s=_POLL_DEADLINE_S)
-                if (newest := (state.boot, state.last_sequence)) != self._known:
+                if (newest := (state.boot, state.fruit_changes)) != self._known:
                     self.recent = await self.request(GetRecent(most=200), Recent)
                     self.last, self._known = await self._fruit(state.last_sequence), newest
                 self.state, self.heard_s = state, time.monotonic()

@@ -217,6 +217,8 @@ class PanelState(ChannelMessage):
     """Latched stops to recover from."""
     last_sequence: int | None
     """Of the last fruit with an outcome."""
+    fruit_changes: int
+    """Counts up with each new fruit, and with each whose outcome for the PLC became another one."""
     lot_counts: Counts
     deadline_s: float | None
     """The longest that an inspection may take by the active recipe and settings."""

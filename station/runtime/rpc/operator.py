@@ -141,6 +141,7 @@ class PanelServer:
             may=self._operator_commands.possible,
             recoveries=self._operator_commands.recoveries,
             last_sequence=self._inspections.last_sequence,
+            fruit_changes=self._inspections.changes,
             lot_counts=self._inspections.counts(self._lots.lot),
             deadline_s=None if active is None else service.pacing.limits(active.recipe).inspection_s,
             setup=setup_view(self._configuration, self._devices),

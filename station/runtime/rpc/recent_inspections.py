@@ -60,6 +60,8 @@ class RecentInspections:
         self._short: deque[FruitSummary] = deque(maxlen=MOST_IN_SHORT)
         self._lots: OrderedDict[str, Counter[str]] = OrderedDict()
         self._turn = asyncio.Lock()
+        self.changes = 0
+        """Counts up with each new fruit and each other outcome."""
 
     @property
     def last_sequence(self) -> int | None:
@@ -83,6 +85,7 @@ class RecentInspections:
         while len(self._by_sequence) > MOST_IN_FULL:
             self._by_sequence.popitem(last=False)
         self._short.append(fruit.short)
+        self.changes += 1
         self._lots.setdefault(fruit.short.lot, Counter())[fruit.short.outcome] += 1
         while len(self._lots) > MOST_IN_FULL:
             self._lots.popitem(last=False)
@@ -95,6 +98,7 @@ class RecentInspections:
         before = entry.fruit.short
         now = before.model_copy(update={"outcome": outcome.outcome, "reasons": tuple(map(str, outcome.reasons))})
         entry.fruit = entry.fruit.model_copy(update={"short": now})
+        self.changes += 1
         self._short = deque((now if each.sequence == now.sequence else each for each in self._short), MOST_IN_SHORT)
         if (counted := self._lots.get(before.lot)) is not None:
             counted.subtract([before.outcome])

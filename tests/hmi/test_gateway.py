@@ -1,0 +1,52 @@
+"""The pages' gateway: what is polled of the station, and when the last fruit is asked for again."""
+
+import asyncio
+from typing import Any
+
+from hmi.web.gateway import Gateway
+from station.channel.line import Outcome
+from station.channel.panel_live import Fruit, FruitSummary, GetFruit, GetPanelState, GetRecent, PanelState, Recent
+from station.runtime.rpc.recent_inspections import RecentInspections, RestoredFruit
+from station.vocabulary import Reason
+
+PASSED = FruitSummary(
+    sequence=7, outcome="PASS", reasons=(), ended_utc_ms=1, duration_ms=1900, recipe="strawberry", lot="A",
+    area_mm2=60.0, closing_mm=3.0, areas_mm2=(),
+)  # fmt: skip
+
+
+class Station(Gateway):
+    """A gateway whose requests a station's recent fruit answer."""
+
+    def __init__(self, inspections: RecentInspections) -> None:
+        super().__init__("ipc:///nowhere", 0.01)
+        self._inspections, self.asked = inspections, list[str]()
+
+    async def request(self, request: Any, reply: Any, *, deadline_s: float = 2.0) -> Any:
+        self.asked.append(type(request).__name__)
+        match request:
+            case GetPanelState():
+                last = self._inspections.last_sequence
+                return PanelState.model_construct(boot="1", last_sequence=last, fruit_changes=self._inspections.changes)
+            case GetRecent():
+                return Recent(fruit=self._inspections.recent(request.most))
+            case GetFruit():
+                return self._inspections.fruit(request.sequence)
+        raise AssertionError(request)
+
+
+def test_an_outcome_that_the_plc_was_given_in_place_of_the_stations_is_shown():
+    async def scenario():
+        inspections = RecentInspections()
+        inspections.restore([PASSED], [RestoredFruit(Fruit.model_construct(short=PASSED), None)], {"A": {"PASS": 1}})
+        async with Station(inspections) as gateway:
+            await gateway.polled()
+            await gateway.polled()
+            shown = [gateway.last.short.outcome if gateway.last else None]
+            inspections.set_outcome(Outcome.model_construct(sequence=7, outcome="NO_RESULT", reasons=(Reason.LATE,)))
+            await gateway.polled()
+            await gateway.polled()
+            shown.append(gateway.last.short.outcome if gateway.last else None)
+            return shown, gateway.recent.fruit[0].outcome, gateway.asked.count("GetFruit")
+
+    assert asyncio.run(scenario()) == (["PASS", "NO_RESULT"], "NO_RESULT", 2)
