@@ -16,7 +16,7 @@ from hmi.web.roles import Right, Role
 from hmi.web.sessions import Caller
 from hmi.web.user_store import UserStoreError, least_digits
 from station.channel.panel_live import PersonNoted
-from station.serving.guard import is_loopback
+from station.serving.guard import is_this_machines
 
 router = APIRouter()
 ENTRY = Entry("people", "/people")
@@ -37,7 +37,7 @@ async def people(request: Request, hmi: HmiNow, back: Annotated[str, Query(max_l
 @router.post("/people/begin")
 async def begin(request: Request, hmi: HmiNow, _: GenuineCaller, name: Name, pin: Pin, again: Pin) -> Response:
     """Set the administrator's PIN at the first start, at the machine itself."""
-    if not is_loopback(address_of(request)):
+    if not is_this_machines(address_of(request)):
         raise Problem(403, "people.only_here")
     if pin != again:
         return _page(request, hmi, "/", "people.pin_differs")
@@ -149,7 +149,7 @@ def _page(
         chosen=chosen,
         people=hmi.people.names(),
         broken=hmi.people.broken,
-        here=is_loopback(address_of(request)),
+        here=is_this_machines(address_of(request)),
         roles=[role for role in Role if role is not Role.VIEWER],
         least_digits={role: least_digits(role) for role in Role},
     )

@@ -4,7 +4,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 
-from station.serving.guard import is_loopback
+from station.serving.guard import is_this_machines
 
 FREE_TRIES = 4
 FIRST_WAIT_S = 5.0
@@ -27,7 +27,7 @@ class LoginRateLimiter:
 
     def knows(self, address: str) -> bool:
         """Return whether an address is the station's own screen, or somebody has logged in there before."""
-        return is_loopback(address) or any(where == address for _, where in self._logged_in)
+        return is_this_machines(address) or any(where == address for _, where in self._logged_in)
 
     def wait_s(self, name: str, address: str) -> float:
         """Return the delay of the next try, 0 for none; the name is empty for who does not exist."""
@@ -55,7 +55,7 @@ class LoginRateLimiter:
         here = f"{name} at {address}"
         if (name, address) in self._logged_in:
             return (here,)
-        return (here if is_loopback(address) else f"name {name}", f"address {address}")
+        return (here if is_this_machines(address) else f"name {name}", f"address {address}")
 
     def _wait_s(self, key: str) -> float:
         tries, at_s = self._wrong.get(key, (0, 0.0))

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import ipaddress
 import logging
 import socket
 import time
@@ -44,10 +45,22 @@ class Limits(NamedTuple):
     """Of all known addresses together."""
 
 
-def is_loopback(address: str) -> bool:
-    """Return whether an address is this machine's own."""
-    plain = address.removeprefix("::ffff:")
-    return plain.startswith("127.") or plain == "::1"
+def is_this_machines(address: str) -> bool:
+    """Return whether an address is this machine's own: a browser here comes from the one that it opens."""
+    try:
+        plain = ipaddress.ip_address(address.removeprefix("::ffff:"))
+    except ValueError:
+        return False
+    if plain.is_loopback:
+        return True
+    if plain.is_unspecified or plain.is_multicast:
+        return False
+    with socket.socket(socket.AF_INET if plain.version == 4 else socket.AF_INET6) as probe:
+        try:
+            probe.bind((str(plain), 0))  # the kernel binds to no other machine's
+        except OSError:
+            return False
+    return True
 
 
 class GuardedConnection(socket.socket):

@@ -12,7 +12,7 @@ from starlette.types import ASGIApp
 
 from station.errors import StationError
 from station.memory import return_freed_memory
-from station.serving.guard import ADMITTED_AT_ONCE, KEEP_ALIVE_S, GuardedListener, Limits, is_loopback
+from station.serving.guard import ADMITTED_AT_ONCE, KEEP_ALIVE_S, GuardedListener, Limits, is_this_machines
 
 CLOSE_S = 1.0
 """Maximum wait for pending answers when closing."""
@@ -73,7 +73,7 @@ class Server(uvicorn.Server):
 
 
 def listen(
-    host: str, port: int, setting: str, what: str, limits: Limits, known: Callable[[str], bool] = is_loopback
+    host: str, port: int, setting: str, what: str, limits: Limits, known: Callable[[str], bool] = is_this_machines
 ) -> GuardedListener:
     """Return a listening socket, or raise one clear sentence.
 

@@ -181,6 +181,10 @@ class TestLogIn:
         assert pages.post("/people/begin", csrf=pages.token(), name="eve", pin=PIN, again=PIN)[0] == 403
         assert pages.context.people.first_start
 
+    def test_the_station_itself_is_there_also_by_the_address_of_its_network_card(self, pages, card_address):
+        pages.asked_from = card_address
+        assert pages.post("/people/begin", csrf=pages.token(), name="admin", pin=PIN, again=PIN)[0] == 303
+
     def test_who_is_logged_in_may_not_try_pins_without_end_either(self, pages):
         pages.context.people.begin("admin", PIN)
         log_in(pages)

@@ -10,7 +10,7 @@ from starlette.applications import Starlette
 from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
-from station.serving.guard import Limits, is_loopback
+from station.serving.guard import Limits, is_this_machines
 from station.serving.server import Server, listen
 
 ASK = b"GET / HTTP/1.1\r\nhost: here\r\n\r\n"
@@ -238,7 +238,22 @@ def test_a_place_is_held_until_the_request_of_who_left_is_done(door):
 
 @pytest.mark.parametrize(
     ("address", "own"),
-    [("127.0.0.1", True), ("::1", True), ("::ffff:127.0.0.1", True), ("::12", False), ("10.0.0.1", False), ("", False)],
+    [
+        ("127.0.0.1", True),
+        ("::1", True),
+        ("::ffff:127.0.0.1", True),
+        ("::12", False),
+        ("192.0.2.1", False),
+        ("0.0.0.0", False),
+        ("::", False),
+        ("224.0.0.1", False),
+        ("", False),
+        ("a name", False),
+    ],
 )
-def test_loopback(address, own):
-    assert is_loopback(address) is own
+def test_which_addresses_are_this_machines(address, own):
+    assert is_this_machines(address) is own
+
+
+def test_the_address_of_its_network_card_is_this_machines(card_address):
+    assert is_this_machines(card_address)
