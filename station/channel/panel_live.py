@@ -25,9 +25,10 @@ class OperatorCommandName(StrEnum):
     START = "start"
     """Make a stopped station ready, and confirm that the cell is safe if a stop is latched: the PLC's reset."""
     STOP = "stop"
-    """Take no more triggers; the fruit under way becomes NO_RESULT unless its images are all taken."""
+    """Take no more triggers; the fruit under way is inspected to its end."""
     CALL_OFF = "call_off"
-    """End the running inspection with NO_RESULT."""
+    """End the running inspection with NO_RESULT. Argument: its number; refused where it is another's by now. Empty
+    where it is not known."""
     RECOVER = "recover"
     """Argument: one of `RecoveryName`."""
     SET_MODE = "set_mode"
@@ -215,6 +216,8 @@ class PanelState(ChannelMessage):
     """Commands that would be accepted now."""
     recoveries: tuple[RecoveryName, ...]
     """Latched stops to recover from."""
+    running_sequence: int | None
+    """Of the fruit being inspected; None for none, and before its trigger is durable."""
     last_sequence: int | None
     """Of the last fruit with an outcome."""
     fruit_changes: int

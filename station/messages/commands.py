@@ -36,6 +36,9 @@ CONFIRM_STOP = define(
 BUSY_CALL_OFF = define("command.busy_call_off", "an inspection is under way: call it off first")
 BUSY = define("command.busy", "an inspection is under way: wait for its end")
 JUDGED = define("command.judged", "the inspection is already judged")
+ANOTHER_FRUIT = define(
+    "command.another_fruit", "fruit {sequence} is done, and nothing was ended: another one is inspected by now, or none"
+)
 TOO_SLOW = define(
     "command.too_slow", "{command} did not come to its end within {limit_s} s: {activity}", activity=Nested()
 )

@@ -37,7 +37,7 @@ def state(setup=FRESH_SETUP, fault: Message | None = AWAY, recipe=None, devices=
         "stopping": False, "simulated": False, "recipe": recipe, "check_due": None, "alarms": (), "orders": (),
         "devices": tuple(DeviceView(name=name, fault=fault, age_s=None) for name in devices), "may": (),
         "recoveries": (), "plc_connected": False, "plc_alive": False, "line_trouble": None, "last_sequence": None,
-        "fruit_changes": 0,
+        "running_sequence": None, "fruit_changes": 0,
         "setup": setup,
     }  # fmt: skip
     return PanelState.model_construct(**(values | more))

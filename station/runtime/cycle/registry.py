@@ -65,6 +65,11 @@ class InspectionRegistry:
         return None
 
     @property
+    def running_sequence(self) -> int | None:
+        """Of the inspection under way; None for none, and before its trigger is durable."""
+        return None if self.running is None else self.running.sequence
+
+    @property
     def running(self) -> Inspection | None:
         """Return the first inspection without a durable outcome, if any."""
         return next((now for now in self._begun if now.standing is None), None)

@@ -140,6 +140,7 @@ class PanelServer:
             orders=self._operator_commands.recent,
             may=self._operator_commands.possible,
             recoveries=self._operator_commands.recoveries,
+            running_sequence=service.registry.running_sequence,
             last_sequence=self._inspections.last_sequence,
             fruit_changes=self._inspections.changes,
             lot_counts=self._inspections.counts(self._lots.lot),
