@@ -52,6 +52,19 @@ def test_nothing_is_secret_and_what_is_comes_as_a_file(compose, root):
     assert tracked.stdout.split() == ["deploy/containers/secrets/.gitignore"]
 
 
+def test_the_documented_commands_make_every_secret(compose, root, tmp_path):
+    page = (root / "docs/deployment.md").read_text()
+    block = re.search(r"```\n(cd deploy\n.*?)```", page, re.DOTALL)
+    assert block is not None
+    secrets = tmp_path / "containers/secrets"
+    secrets.mkdir(parents=True)
+    loops = "\n".join(line for line in block[1].splitlines() if line.startswith("for "))
+    subprocess.run(["bash", "-euc", loops], cwd=tmp_path, check=True, timeout=60)
+    assert {file.name for file in secrets.iterdir()} == {
+        Path(each["file"]).name for each in compose["secrets"].values()
+    }
+
+
 def test_what_is_mounted_is_there_and_what_is_written_is_a_volume(compose, root):
     for name, service in compose["services"].items():
         for mount in service["volumes"]:
