@@ -255,6 +255,10 @@ class ArmLink:
             self._was_healthy = False
         snapshot = await self._heard(process)
         self._failures = 0
+        if self.healthy and snapshot.runtime_state == PLAYING and not snapshot.kicks_late:
+            # The lapse was shorter than the watchdog's limit: it does not explain a stop from now on. A stop by the
+            # watchdog that this state is too old to show has late kicks; without them a person has to check.
+            self._was_healthy = True
         seen = from_state(snapshot)
         latched = self._latched.cause if self._latched is not None else None
         if seen is not None:

@@ -18,7 +18,7 @@ from station.devices.arm.messages import Move, Reachable
 from station.devices.arm.ur import UrArm
 from station.messages import arm as messages
 from station.settings.arm import ArmPoses, ArmSettings
-from station.twin.ur.script import RuntimeState
+from station.twin.ur.script import ControlScript, RuntimeState
 
 AWAY = ArmPoses(home=(2.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0))
 """A home that is a long way off."""
@@ -617,6 +617,24 @@ def test_a_station_that_is_not_healthy_any_more_has_its_arm_stopped_by_the_contr
             arm.renew_health(60.0)
             await arm.upload_again()
             assert (await arm.state()).ready
+
+    asyncio.run(run())
+
+
+def test_a_stop_on_the_pendant_after_a_short_lapse_of_the_stations_health_waits_for_a_person(bench, until, monkeypatch):
+    # The lapse ends before the watchdog expires, however busy the machine.
+    monkeypatch.setattr(ControlScript, "_set_watchdog", lambda _script: None)
+
+    async def run():
+        async with bench() as made, UrArm(made.settings()) as arm:
+            arm.renew_health(60.0)
+            await arm.ready(20.0)
+            arm.renew_health(0.0)
+            await until(lambda: not arm._link._was_healthy)
+            arm.renew_health(60.0)
+            await until(lambda: arm._link._was_healthy)
+            made.faults.set("pendant_stop")
+            await until(lambda: has_cause(arm, ArmCause.PROGRAM_STOPPED))
 
     asyncio.run(run())
 
