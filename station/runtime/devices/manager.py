@@ -126,11 +126,16 @@ class DeviceManager:
 
     def use(self, *, by_inspection: bool) -> None:
         """Leave camera and gripper to an inspection, or monitor them again; the arm is always monitored."""
+        if by_inspection:
+            self._confirmed_clear = False
         for name in (CAMERA, GRIPPER):
             self.monitors[name].use(by_inspection=by_inspection)
 
     def confirm_clear(self) -> None:
-        """Note that a person has confirmed that nothing is between the jaws; valid for one activation."""
+        """Note that a person has confirmed that nothing is between the jaws.
+
+        Valid for one activation, and only until the gripper is found active: from then on it may close on something.
+        """
         self._confirmed_clear = True
 
     def report_fault(self, fault: StationError) -> None:
@@ -225,7 +230,8 @@ class DeviceManager:
             StationError: activation is not safe, with the remedy; or it failed.
         """
         reading = await self.cell.gripper.read()
-        if reading.active and reading.fault_code not in NEEDS_ACTIVATION:
+        if _is_activated(reading):
+            self._confirmed_clear = False
             return
         try:
             if not self._confirmed_clear:
@@ -264,6 +270,8 @@ class DeviceManager:
     async def _check_gripper(self) -> None:
         reading = await self.cell.gripper.read()
         self._gripper_reading = reading
+        if _is_activated(reading):
+            self._confirmed_clear = False
         if reading.fault_code in NEEDS_ACTIVATION or reading.fault_code == _OVER_TEMPERATURE:
             fault = GripperFaultError(reading.fault_code)
         elif not reading.active:
@@ -280,6 +288,11 @@ class DeviceManager:
         self._stale_checks = self._stale_checks + 1 if stale else 0
         if fault is not None and not 0 < self._stale_checks < _STALE_CHECKS:
             raise fault.again()
+
+
+def _is_activated(reading: GripperReading) -> bool:
+    """Check whether a gripper could move its fingers, and so may hold something between them."""
+    return reading.active and reading.fault_code not in NEEDS_ACTIVATION
 
 
 def _is_stop(fault: StationError) -> bool:

@@ -1,0 +1,121 @@
+"""When a gripper that lost its activation is activated by itself, when a person is needed, and what is reported."""
+
+import asyncio
+import time
+from dataclasses import dataclass
+
+import pytest
+
+from station.devices.arm.arm import ArmState
+from station.devices.gripper.errors import GripperNotActiveError
+from station.devices.gripper.interface import GripperReading, ObjectState
+from station.messages import gripper as gripper_messages
+from station.runtime.devices.manager import GRIPPER, DeviceManager
+from station.runtime.devices.rig import Cell
+from station.settings.configuration import Configuration
+
+EMPTY_THE_JAWS = GripperNotActiveError(gripper_messages.JAWS_UNKNOWN(), gripper_messages.REMEDY_EMPTY_JAWS())
+AROUND_A_FRUIT_MM = 20.0
+
+
+@dataclass
+class Gripper:
+    """A gripper with its fingers around a fruit."""
+
+    active: bool = True
+    fault_code: int = 0
+    activations: int = 0
+    max_width_mm: float = 53.0
+
+    async def read(self):
+        state, now_s = ObjectState.IDLE, time.monotonic()
+        return GripperReading(AROUND_A_FRUIT_MM, 120, 120, state, self.active, self.fault_code, None, now_s)
+
+    async def activate(self):
+        self.activations += 1
+        self.active, self.fault_code = True, 0
+
+
+@dataclass
+class Arm:
+    at: str | None = "nest"
+    fault: Exception | None = None
+
+    async def state(self):
+        return ArmState(0.01, (0.0,) * 6, (0.0, 0.0, 0.0), moving=False, at=self.at, fault=self.fault)
+
+    async def move_to(self, pose):
+        self.at = pose
+
+
+@dataclass
+class Bench:
+    """A device manager with a gripper and an arm at the nest, each checked by hand."""
+
+    devices: DeviceManager
+    gripper: Gripper
+    arm: Arm
+
+    async def check(self, name=GRIPPER):
+        """Check a device as its monitor does; its fault from now on."""
+        monitor = self.devices.monitors[name]
+        checking = asyncio.create_task(monitor.run())
+        heard = asyncio.Event()
+        monitor._on_progress = heard.set
+        await heard.wait()
+        checking.cancel()
+        await asyncio.gather(checking, return_exceptions=True)
+        return monitor.fault
+
+    async def activate(self):
+        """Activate as housekeeping does; why it was not done."""
+        try:
+            await self.devices.activate_if_safe()
+        except Exception as error:  # noqa: BLE001 (the test names it)
+            return error
+        return None
+
+
+@pytest.fixture
+def bench(tmp_path):
+    devices, gripper, arm = DeviceManager(Configuration(home=tmp_path), lambda *_: None, lambda _: None), Gripper(), Arm()
+    devices.cell, devices._arm = Cell(devices.cell.camera, gripper, arm), arm
+    return Bench(devices, gripper, arm)
+
+
+@pytest.mark.parametrize("used", ["checked", "inspected", "activated in vain"])
+def test_a_confirmation_of_empty_jaws_ends_with_a_gripper_that_can_close_on_a_fruit(bench, used):
+    async def scenario():
+        bench.devices.confirm_clear()
+        match used:
+            case "checked":
+                assert await bench.check() is None
+            case "inspected":
+                bench.devices.use(by_inspection=True)
+                bench.devices.use(by_inspection=False)
+            case _:
+                assert await bench.activate() is None
+        bench.gripper.active = False
+        refused = await bench.activate()
+        assert str(refused) == str(EMPTY_THE_JAWS)
+        assert str(await bench.check()) == str(EMPTY_THE_JAWS)
+        assert bench.gripper.activations == 0
+
+        bench.devices.confirm_clear()
+        assert await bench.activate() is None
+        assert await bench.check() is None
+        assert bench.gripper.activations == 1
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(("active", "fault_code"), [(False, 0), (True, 0xC), (False, 0xC)])
+def test_a_confirmation_remains_while_the_gripper_waits_for_its_activation(bench, active, fault_code):
+    async def scenario():
+        bench.gripper.active, bench.gripper.fault_code = active, fault_code
+        bench.devices.confirm_clear()
+        assert await bench.check() is not None
+        assert await bench.activate() is None
+        assert bench.gripper.activations == 1
+
+    asyncio.run(scenario())
