@@ -16,6 +16,7 @@ from station.devices.gripper.errors import (
     GripperError,
     GripperFaultError,
     GripperNotActiveError,
+    GripperTimeoutError,
 )
 from station.devices.gripper.interface import GripperReading
 from station.devices.gripper.robotiq import make_gripper
@@ -71,7 +72,8 @@ class DeviceManager:
         self.joints_rad: tuple[float, ...] | None = None
         """The arm's joint positions as last monitored; None where it does not report them."""
         self._bad_frames, self._stale_checks = 0, 0
-        self._not_activated: StationError | None = None
+        self._not_activated: GripperError | None = None
+        """Why the gripper's activation was refused or failed. An error of the arm or of a wire says nothing of it."""
         checks = {CAMERA: self._check_camera, GRIPPER: self._check_gripper}
         if arm is not None:
             checks[ARM] = self._check_arm
@@ -238,8 +240,11 @@ class DeviceManager:
                 await self._leave_the_nest(reading.width_mm)
             self._confirmed_clear = False
             await self.cell.gripper.activate()
-        except StationError as error:
+        except (GripperNotActiveError, GripperFaultError) as error:
             self._not_activated = error
+            raise
+        except GripperTimeoutError as error:
+            self._not_activated = GripperNotActiveError(error.cause, error.remedy)
             raise
         self._not_activated = None
 
@@ -271,7 +276,7 @@ class DeviceManager:
         reading = await self.cell.gripper.read()
         self._gripper_reading = reading
         if _is_activated(reading):
-            self._confirmed_clear = False
+            self._confirmed_clear, self._not_activated = False, None
         if reading.fault_code in NEEDS_ACTIVATION or reading.fault_code == _OVER_TEMPERATURE:
             fault = GripperFaultError(reading.fault_code)
         elif not reading.active:

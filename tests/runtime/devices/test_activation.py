@@ -3,18 +3,24 @@
 import asyncio
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import pytest
 
 from station.devices.arm.arm import ArmState
-from station.devices.gripper.errors import GripperNotActiveError
+from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.gripper.errors import GripperFaultError, GripperNotActiveError, GripperTimeoutError
 from station.devices.gripper.interface import GripperReading, ObjectState
 from station.messages import gripper as gripper_messages
-from station.runtime.devices.manager import GRIPPER, DeviceManager
+from station.messages.message import verbatim
+from station.runtime.devices.manager import ARM, GRIPPER, DeviceManager
 from station.runtime.devices.rig import Cell
+from station.settings.arm import PoseName
 from station.settings.configuration import Configuration
 
 EMPTY_THE_JAWS = GripperNotActiveError(gripper_messages.JAWS_UNKNOWN(), gripper_messages.REMEDY_EMPTY_JAWS())
+WAIT = GripperNotActiveError(gripper_messages.NOT_ACTIVE(), gripper_messages.REMEDY_WAIT())
+OVER_TEMPERATURE = 0x8
 AROUND_A_FRUIT_MM = 20.0
 
 
@@ -26,6 +32,7 @@ class Gripper:
     fault_code: int = 0
     activations: int = 0
     max_width_mm: float = 53.0
+    fails: Exception | None = None
 
     async def read(self):
         state, now_s = ObjectState.IDLE, time.monotonic()
@@ -33,13 +40,15 @@ class Gripper:
 
     async def activate(self):
         self.activations += 1
+        if self.fails is not None:
+            raise self.fails
         self.active, self.fault_code = True, 0
 
 
 @dataclass
 class Arm:
-    at: str | None = "nest"
-    fault: Exception | None = None
+    at: PoseName | None = "nest"
+    fault: ArmFault | None = None
 
     async def state(self):
         return ArmState(0.01, (0.0,) * 6, (0.0, 0.0, 0.0), moving=False, at=self.at, fault=self.fault)
@@ -78,7 +87,9 @@ class Bench:
 
 @pytest.fixture
 def bench(tmp_path):
-    devices, gripper, arm = DeviceManager(Configuration(home=tmp_path), lambda *_: None, lambda _: None), Gripper(), Arm()
+    devices = DeviceManager(Configuration(home=tmp_path), lambda *_: None, lambda _: None)
+    gripper: Any = Gripper()
+    arm: Any = Arm()
     devices.cell, devices._arm = Cell(devices.cell.camera, gripper, arm), arm
     return Bench(devices, gripper, arm)
 
@@ -117,5 +128,52 @@ def test_a_confirmation_remains_while_the_gripper_waits_for_its_activation(bench
         assert await bench.check() is not None
         assert await bench.activate() is None
         assert bench.gripper.activations == 1
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize("cause", [ArmCause.STALE, ArmCause.PROTECTIVE_STOP])
+def test_a_fault_of_the_arm_that_is_over_is_not_the_grippers(bench, cause):
+    async def scenario():
+        bench.gripper.active, bench.arm.at = False, "home"
+        bench.arm.fault = ArmFault(cause, verbatim("the arm's own"))
+        assert isinstance(await bench.activate(), ArmFault)
+        assert str(await bench.check()) == str(WAIT)
+        bench.arm.fault = None
+        assert await bench.check(ARM) is None
+        assert str(await bench.check()) == str(WAIT)
+        assert bench.devices.active_stop is None, "which refuses every reset"
+        assert await bench.activate() is None
+        assert await bench.check() is None
+
+    asyncio.run(scenario())
+
+
+def test_a_gripper_that_was_activated_on_the_pendant_forgets_why_the_station_did_not(bench):
+    async def scenario():
+        bench.gripper.active = False
+        assert str(await bench.activate()) == str(EMPTY_THE_JAWS)
+        assert str(await bench.check()) == str(EMPTY_THE_JAWS)
+        bench.gripper.active = True
+        assert await bench.check() is None
+        bench.gripper.fault_code = OVER_TEMPERATURE
+        assert str(await bench.check()) == str(GripperFaultError(OVER_TEMPERATURE))
+        bench.gripper.active, bench.gripper.fault_code = False, 0
+        assert str(await bench.check()) == str(WAIT)
+
+    asyncio.run(scenario())
+
+
+def test_an_activation_that_came_to_no_end_is_reported_and_tried_again(bench):
+    async def scenario():
+        bench.gripper.active, bench.arm.at = False, "home"
+        bench.gripper.fails = late = GripperTimeoutError(verbatim("it came to no end"), verbatim("look for a cable"))
+        assert await bench.activate() is late
+        reported = await bench.check()
+        assert str(reported) == str(late)
+        assert isinstance(reported, GripperNotActiveError), "as which housekeeping tries it again"
+        bench.gripper.fails = None
+        assert await bench.activate() is None
+        assert await bench.check() is None
 
     asyncio.run(scenario())
