@@ -28,6 +28,10 @@ AT_REST_RAD_S = 1e-3
 BESIDE_WITHIN_RAD = 2e-4
 """Nearer than a step beside the nest: 0.3 mm of the tool are at least 4e-4. A place beside the nest is reached within
 this, and an arm at rest within this of a pose is not sent there. Unverified on hardware."""
+NEST_WAY_RAD = 0.03
+"""How far a joint may be outside of its span between the nest and the place above it on the way between them. Estimate:
+10 mm beside the nest (the most that `arm.centring.most_mm` allows) at 0.5 m from a joint are 0.02 rad; the rest is for
+a straight line's bow in the joints."""
 SHORT_AFTER_S = 0.3
 """Time for which an arm has to be at rest elsewhere before the motion counts as failed."""
 
@@ -35,7 +39,8 @@ SHORT_AFTER_S = 0.3
 class UrArm:
     """An `Arm` on ur-rtde, which lives in a process of its own. Belongs to the event loop in which it is opened.
 
-    Moves to and from the nest are straight for the tool; the others are straight for the joints.
+    Moves to the nest, and from it or from the way to it, are straight for the tool; the others are straight for the
+    joints.
     """
 
     def __init__(self, settings: ArmSettings) -> None:
@@ -43,7 +48,6 @@ class UrArm:
         self._link = ArmLink(settings)
         self._moving = asyncio.Lock()
         self._stopped = asyncio.Event()
-        self._last_target: PoseName | None = None
         self._beside_rad: Six | None = None
         """Last target beside the nest."""
         self._reachable: set[tuple[int, PoseName]] = set()
@@ -107,8 +111,7 @@ class UrArm:
             if known not in self._reachable:
                 await self._require_reachable(target, where)
                 self._reachable.add(known)
-            straight = "nest" in {pose, self._last_target or self._place(snapshot.joints_rad)}
-            self._last_target = pose
+            straight = pose == "nest" or self._on_nest_way(snapshot.joints_rad)
             if _rests(snapshot) and _near(snapshot.joints_rad, target, BESIDE_WITHIN_RAD):
                 return  # there already: a motion over no way costs two exchanges with the controller
             await self._go(target, where, self._settings.reached_tolerance_rad, straight=straight)
@@ -133,7 +136,7 @@ class UrArm:
                 no_way = messages.NO_WAY_BESIDE_NEST(x_mm=x_mm, y_mm=y_mm, z_mm=z_mm)
                 raise ArmFault(ArmCause.UNREACHABLE, no_way)
             await self._require_reachable(found.joints_rad, where)
-            self._last_target, self._beside_rad = "nest", found.joints_rad
+            self._beside_rad = found.joints_rad
             await self._go(found.joints_rad, where, BESIDE_WITHIN_RAD, straight=True)
 
     async def stop(self) -> None:
@@ -285,6 +288,14 @@ class UrArm:
         if self._beside_rad is not None and _near(joints_rad, self._beside_rad, tolerance):
             return "nest"
         return next((name for name in POSES if _near(joints_rad, poses.joints_rad(name), tolerance)), None)
+
+    def _on_nest_way(self, joints_rad: Six) -> bool:
+        """Whether the arm is at the nest, or was stopped on the way between it and the place above it."""
+        place, poses = self._place(joints_rad), self._settings.poses
+        if place is not None:
+            return place == "nest"
+        spans = zip(joints_rad, poses.nest, poses.above_nest, strict=True)
+        return all(min(ends) - NEST_WAY_RAD <= joint <= max(ends) + NEST_WAY_RAD for joint, *ends in spans)
 
 
 async def _require_remote(conversation: DashboardConversation) -> None:

@@ -22,7 +22,7 @@ class Process:
 
     state, kicks_late = PLAYING, False
 
-    async def request(self, _request, _reply, *, deadline_s):  # noqa: ARG002 (as the process takes them)
+    async def request(self, _request, _reply, *, deadline_s):
         return Snapshot(
             age_s=0.0,
             joints_rad=SIX,
@@ -49,7 +49,7 @@ async def dashboard(_host):
 
 @pytest.fixture
 def cause_after(monkeypatch):
-    """The cause of a stop after some beats: of each, whether the station is healthy, a program plays, kicks are late."""
+    """The cause of a stop after some beats; of each: is the station healthy, the program's state, late kicks."""
     monkeypatch.setattr(link, "dashboard", dashboard)
 
     def run(*beats):
