@@ -67,9 +67,9 @@ class ServiceSettings(Settings):
     automatic_reset: bool = setting(
         default=True,
         title="Automatic reset",
-        description="Make ready after a start, and after a fault that is gone: the jaws open and the arm goes home. "
-        "After a safety stop or a person's stop, or with a fruit left between the jaws, a person's reset is always "
-        "needed, also after a restart.",
+        description="Make ready after a start, and in production mode after a fault that is gone: the jaws open and "
+        "the arm goes home. After a safety stop or a person's stop, or with a fruit left between the jaws, a person's "
+        "reset is always needed, also after a restart.",
     )
     uncalibrated: Literal["refuse", "allow"] = setting(
         "refuse",

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import time
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from functools import partial
 
 from station.channel.line import Begin, BeginReply, Outcome
@@ -61,7 +61,12 @@ class Service:
         self.pacing = Pacing(configuration, devices.cell)
         self.active: ActiveRecipe | None = None
         """The recipe that the next fruit is inspected with."""
-        self._reset_wanted = self._settings.automatic_reset and self._hold.event is None
+        self._automatic_reset = self._settings.automatic_reset and self._hold.event is None
+        self._reset_given = False
+        """By a person or the PLC, and not carried out yet."""
+        self._in_production = True
+        self.manual_activity: Message | None = None
+        """The activity at the panel that moves something by hand, in manual mode alone; None without one."""
         self.ending = False
         """The end of the process was requested."""
         self.stopped_by_person = False
@@ -124,7 +129,8 @@ class Service:
     @property
     def makes_itself_ready(self) -> bool:
         """Return whether anything may move between fruits without a person's or the PLC's reset."""
-        return self._reset_wanted and not (self.ending or self.stopped_by_person)
+        automatic = self._automatic_reset and self._in_production
+        return (automatic or self._reset_given) and not (self.ending or self.stopped_by_person)
 
     def stop(self) -> None:
         """Accept no trigger until `allow`: a person has stopped the station."""
@@ -138,7 +144,24 @@ class Service:
 
     def request_reset(self) -> None:
         """Let a stopped station make itself ready."""
-        self._reset_wanted = True
+        self._reset_given = True
+
+    def set_mode(self, *, production: bool) -> None:
+        """Reset automatically in production mode only: in another, people may reach into the cell.
+
+        A reset that was given before is withdrawn there.
+        """
+        self._in_production = production
+        self._reset_given = self._reset_given and production
+
+    @contextlib.contextmanager
+    def manual(self, activity: Message) -> Iterator[None]:
+        """Keep mode and devices to an activity at the panel that moves something; a refused person reads which."""
+        self.manual_activity = activity
+        try:
+            yield
+        finally:
+            self.manual_activity = None
 
     def listen(self, on_published: Callable[[Outcome], None]) -> None:
         """Call a function, in place of the one before, once with every outcome that the PLC was given."""
@@ -237,11 +260,12 @@ class Service:
         if self._now is not None and STATES[after].refusal is Refusal.BUSY and after not in ACCEPTING:
             self._now.phases_s[after.value] = self._now.phases_s.get(after.value, 0.0) + took_s
         inspecting_now = STATES[state].refusal is Refusal.BUSY and state not in ACCEPTING
-        self._devices.use(by_inspection=inspecting_now)
+        if self.manual_activity is None:  # else they are that activity's
+            self._devices.use(by_inspection=inspecting_now)
         if state in {State.LATCHED, State.CARRIED}:
-            self._reset_wanted = False
+            self._automatic_reset = self._reset_given = False
         if state is State.IDLE:
-            self._reset_wanted = self._settings.automatic_reset
+            self._automatic_reset, self._reset_given = self._settings.automatic_reset, False
             self.alarms.clear(AlarmId.FRUIT_HELD)
         if state is State.STOPPED and self.makes_itself_ready:
             self.runner.post(Event.RESET)

@@ -1,10 +1,8 @@
 """PLC commands between fruits, and the line's state as the PLC interface reports it."""
 
 import asyncio
-import contextlib
 import logging
 import time
-from collections.abc import Iterator
 from typing import Any
 
 from station.channel.line import Command, CommandDone, CommandName, Line, RegisterView
@@ -16,6 +14,7 @@ from station.inspection.cycle import UNJUDGED, WAITING, Event
 from station.inspection.states import STATES, State
 from station.messages import commands as messages
 from station.messages import operation
+from station.messages.maintenance import UNDER_WAY
 from station.messages.message import Message, message_of
 from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import DeviceManager
@@ -32,7 +31,8 @@ DEADLINE_S = 25.0
 """Less than the PLC interface's own deadline for a command."""
 LINE_SILENT_S = 2.0
 STOP_WITHIN_S = 0.5
-MODES = (1, 2, 3)
+PRODUCTION = 1
+MODES = (PRODUCTION, 2, 3)
 _STOPPED = "stopped_by_a_person"
 _ON_ALARMS = {CommandName.CLEAR_ALARMS: "acknowledged", CommandName.RESET: "reset"}
 
@@ -52,11 +52,9 @@ class PlcCommands:
         self._service, self._devices, self._recipes = service, devices, recipes
         self._lots, self._state_files = lots, state_files
         self._metrics, self._audit = observability.metrics, observability.audit
-        self.mode = MODES[0]
+        self.mode = PRODUCTION
         """PackML's: 1 production, 2 maintenance, 3 manual."""
         self.recipe_changing = False
-        self.manual_activity: Message | None = None
-        """The activity at the panel during which the mode stays; None without one."""
         self.registers_wanted = False
         """The PLC interface's registers are wanted with its next beat."""
         self.registers: tuple[tuple[RegisterView, ...], float] = ((), 0.0)
@@ -73,15 +71,6 @@ class PlcCommands:
     def line_age_s(self) -> float | None:
         """Return the time since the PLC interface's last message; None if there was none."""
         return None if self._line_at_s is None else time.monotonic() - self._line_at_s
-
-    @contextlib.contextmanager
-    def manual(self, activity: Message) -> Iterator[None]:
-        """Keep the mode unchanged while an activity at the panel moves something; a refused person reads which."""
-        self.manual_activity = activity
-        try:
-            yield
-        finally:
-            self.manual_activity = None
 
     def request_registers(self) -> None:
         """Request the PLC interface's registers with its next beat."""
@@ -180,9 +169,11 @@ class PlcCommands:
     def _set_mode(self, mode: int) -> Message | None:
         if mode not in MODES:
             return messages.MODE_UNKNOWN(mode=mode)
-        if self.manual_activity is not None and mode != self.mode:
-            return messages.MODE_KEPT(activity=self.manual_activity)
+        activity = self._service.manual_activity
+        if activity is not None and mode != self.mode:
+            return messages.MODE_KEPT(activity=activity)
         self.mode = mode
+        self._service.set_mode(production=mode == PRODUCTION)
         return None
 
     async def _change_recipe(self, number: int) -> Message | None:
@@ -259,6 +250,8 @@ class PlcCommands:
             return messages.ENDING()
         if stop := self._devices.active_stop or self._devices.power_missing:
             return messages.CONFIRM_STOP(stop=message_of(stop))
+        if activity := self._service.manual_activity:
+            return UNDER_WAY(activity=activity)
         busy = STATES[self._service.state].refusal is Refusal.BUSY
         return messages.BUSY_CALL_OFF() if busy else None
 
@@ -276,17 +269,17 @@ class PlcCommands:
             return None
         service.request_reset()
         self._devices.confirm_clear()
-        if state is State.LATCHED:
-            service.runner.post(Event.PERSON_CONFIRMED, operation.RESET())
-        elif state is State.STOPPED:
-            service.runner.post(Event.RESET)
-        else:
+        if state not in {State.LATCHED, State.STOPPED}:
             try:
                 await self._devices.restart_program()
             except ArmFault as fault:
                 return message_of(fault)
-            if state is State.CARRIED:
-                service.runner.post(Event.PERSON_CONFIRMED, operation.RESET())
+        if activity := service.manual_activity:  # begun while this reset waited
+            return UNDER_WAY(activity=activity)
+        if state is State.STOPPED:
+            service.runner.post(Event.RESET)
+        elif state in {State.LATCHED, State.CARRIED}:
+            service.runner.post(Event.PERSON_CONFIRMED, operation.RESET())
         return await self._until_ready()
 
     async def _until_ready(self) -> Message | None:

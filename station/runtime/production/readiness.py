@@ -10,11 +10,10 @@ from station.runtime.devices.manager import DeviceManager
 from station.runtime.observability.health import Readiness
 from station.runtime.observability.observability import Observability
 from station.runtime.production.lots import LotManager
-from station.runtime.production.plc_commands import PlcCommands
+from station.runtime.production.plc_commands import PRODUCTION, PlcCommands
 from station.runtime.recipes.active import ActiveRecipes
 from station.vocabulary import PackmlState, Refusal
 
-PRODUCTION = 1
 _DEVICES_DECIDE = {State.UNKNOWN, State.HELD}
 
 

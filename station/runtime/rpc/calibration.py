@@ -82,7 +82,7 @@ class PanelCalibration:
         worker: PanelWorker,
         refusal: Callable[[], Message | None],
     ) -> None:
-        self._site, self._devices, self._plc_commands = configuration, production.devices, production.plc_commands
+        self._site, self._service, self._devices = configuration, production.service, production.devices
         self._records, self._audit, self._worker, self._refusal = records, audit, worker, refusal
         self._store = CalibrationStore(configuration.home)
         self._run: _Run | None = None
@@ -131,7 +131,7 @@ class PanelCalibration:
         run = self._run = _Run(request.kind, request.actor)
         self._note(request.actor, "begun")
         undisturbed = contextlib.ExitStack()
-        undisturbed.enter_context(self._plc_commands.manual(_NAMES[request.kind]()))
+        undisturbed.enter_context(self._service.manual(_NAMES[request.kind]()))
         self._devices.use(by_inspection=True)
         undisturbed.callback(lambda: self._devices.use(by_inspection=False))
         run.task = asyncio.create_task(self._run_procedure(run, request), name=f"{request.kind} at the panel")
@@ -158,8 +158,8 @@ class PanelCalibration:
         return _run_view(run)
 
     def _why_not(self, serial: str) -> Message | None:
-        if self._run is not None and self._run.open:
-            return UNDER_WAY(activity=_NAMES[self._run.kind]())
+        if activity := self._service.manual_activity:
+            return UNDER_WAY(activity=activity)
         if not serial:
             return messages.NO_SENSOR()
         return self._refusal()

@@ -103,7 +103,7 @@ class PanelMaintenance:
             return messages.SET_MANUAL(mode=mode, manual=MANUAL)
         if service.state not in _JOGGED:
             return facts.activity
-        activity = self._plc_commands.manual_activity
+        activity = service.manual_activity
         if activity is not None and not self._moving.locked():
             return messages.UNDER_WAY(activity=activity)
         return None
@@ -159,7 +159,7 @@ class PanelMaintenance:
             if self._moving.locked():
                 raise NotNowError(messages.JOG_MOVING())
             async with self._moving:
-                with self._plc_commands.manual(JOGGING()):
+                with self._service.manual(JOGGING()):
                     wide_mm = gripper.max_width_mm if width_mm is None else width_mm
                     reading = (await gripper.move_to_width(wide_mm, JOG_SPEED_MM_S, JOG_FORCE_N)).reading
         self._devices.monitors[GRIPPER].report_success()

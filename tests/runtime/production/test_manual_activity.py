@@ -1,0 +1,218 @@
+"""While a person calibrates in manual mode, nothing but the procedure moves: no reset, by whomever or by itself."""
+
+import asyncio
+import contextlib
+import json
+import threading
+
+import pytest
+
+from station.channel.client import ChannelClient
+from station.channel.line import CommandName
+from station.channel.panel import Actor
+from station.channel.panel_live import (
+    GetPanelState,
+    OperatorCommand,
+    OperatorCommandName,
+    OperatorCommandView,
+    PanelState,
+)
+from station.channel.panel_maintenance_queries import (
+    CalibrationRunView,
+    CalibrationState,
+    EndCalibrationRun,
+    GetCalibration,
+    Jogged,
+    JogGripper,
+    StartCalibrationRun,
+)
+from station.inspection.states import State
+from station.messages.calibration import A_CALIBRATION, STEP_PRESS
+from station.messages.commands import JOGGING
+from station.messages.maintenance import UNDER_WAY
+from station.runtime.devices.manager import CAMERA, GRIPPER
+from station.runtime.state_files import StateFiles
+from station.settings.hmi import panel_endpoint
+from station.settings.recipe import load_recipes
+
+MAX = Actor(who="Max", role="maintenance")
+MANUAL = 3
+PLACES = ((-2.5, 0.0),)
+
+
+@pytest.fixture
+def at_ball(bench, settings_file, tmp_path):
+    """A ready station with the ball in its nest, in manual mode, its panel, and the states that it enters then."""
+
+    @contextlib.asynccontextmanager
+    async def begin(**service):
+        file = settings_file(**service)
+        values = load_recipes()["rubber_ball"].model_dump(mode="json")
+        values["imaging"]["frames_per_step"] = 1
+        (tmp_path / "recipes" / "rubber_ball.yaml").write_text(json.dumps(values))
+        async with bench(file) as cell:
+            await cell.line.order(CommandName.RESET)  # on a bench a person first says that the jaws are clear
+            await cell.until(lambda: cell.phase is State.IDLE, patience_s=150)
+            cell.lay("rubber_ball")
+            assert (await cell.line.order(CommandName.SET_MODE, MANUAL)).done
+            service, entered = cell.station.service, []
+            note = service.entered
+            service.entered = lambda state, *of: (note(state, *of), entered.append(state))
+            endpoint = panel_endpoint(cell.configuration.hmi, cell.configuration.home)
+            async with ChannelClient(endpoint, "the station") as panel:
+                yield cell, panel, entered
+
+    return begin
+
+
+async def stop(panel):
+    order = OperatorCommand(person=MAX, order=OperatorCommandName.STOP)
+    assert (await panel.request(order, OperatorCommandView, deadline_s=20)).state == "done"
+
+
+async def start_run(panel):
+    request = StartCalibrationRun(kind="calibration", places=PLACES, actor=MAX)
+    await panel.request(request, CalibrationRunView, deadline_s=20)
+
+
+async def run_now(panel):
+    return (await panel.request(GetCalibration(), CalibrationState, deadline_s=20)).run
+
+
+async def until_waits(cell, panel):
+    """Wait until the run has pressed the ball, and the person lays it at another place: hands are in the cell."""
+
+    async def waits():
+        run = await run_now(panel)
+        assert run.state in {"running", "waiting"}, run
+        return run.state == "waiting"
+
+    await cell.until(waits)
+
+
+async def end_run(panel):
+    assert (await panel.request(EndCalibrationRun(actor=MAX), CalibrationRunView, deadline_s=60)).state == "ended"
+
+
+@pytest.mark.timeout(300)
+def test_a_reset_while_the_ball_is_pressed_is_refused_and_moves_nothing(at_ball):
+    async def scenario():
+        async with at_ball(bench=False) as (cell, panel, entered):
+            await stop(panel)
+            await start_run(panel)
+
+            async def pressed():
+                return any(step.title == STEP_PRESS() for step in (await run_now(panel)).steps)
+
+            await cell.until(pressed)
+            refused = await cell.line.order(CommandName.RESET)
+            assert (refused.done, refused.why) == (False, UNDER_WAY(activity=A_CALIBRATION()))
+            state = await panel.request(GetPanelState(), PanelState, deadline_s=20)
+            assert OperatorCommandName.START not in state.may
+            assert cell.station.service.stopped_by_person, "the person's stop is still in force"
+            await until_waits(cell, panel)
+            assert entered == [State.STOPPED]
+            await end_run(panel)
+            done = await cell.line.order(CommandName.RESET)
+            assert done.done, done.why
+            assert cell.phase is State.IDLE
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(300)
+def test_a_link_that_returns_during_a_run_moves_nothing_before_a_person_resets(at_ball):
+    """The run was begun without a *Stop*."""
+
+    async def scenario():
+        async with at_ball(bench=False) as (cell, panel, entered):
+            await start_run(panel)
+            await until_waits(cell, panel)
+            monitors = cell.station.service._devices.monitors
+            heard_s = monitors[CAMERA].heard_s, monitors[GRIPPER].heard_s
+            cell.twin.boards["arm"].set("link_cut")
+            await cell.until(lambda: cell.phase is State.HELD)
+            cell.twin.boards["arm"].clear()
+            await cell.until(lambda: not cell.station.service._devices.faults)
+            assert (await run_now(panel)).state == "waiting"
+            assert entered == [State.HELD]
+            assert (monitors[CAMERA].heard_s, monitors[GRIPPER].heard_s) == heard_s, "they are the procedure's"
+            await end_run(panel)
+            await cell.until(lambda: State.STOPPED in entered)
+            await cell.station.service.runner.taken()
+            assert entered[-1] is State.STOPPED
+            assert (await cell.line.order(CommandName.SET_MODE, 1)).done
+            await cell.station.service.runner.taken()
+            assert entered[-1] is State.STOPPED, "a mode is no reset"
+            done = await cell.line.order(CommandName.RESET)
+            assert done.done, done.why
+            assert cell.phase is State.IDLE
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_in_manual_mode_a_reset_waits_for_a_lost_device_and_the_mode_takes_it_back(at_ball):
+    async def scenario():
+        async with at_ball() as (cell, _, _):
+            camera, service = cell.twin.boards["camera"], cell.station.service
+            camera.set("off")
+            await cell.until(lambda: cell.phase is State.HELD)
+            reset = asyncio.create_task(cell.line.order(CommandName.RESET))
+            await cell.until(lambda: service.makes_itself_ready)
+            camera.clear()
+            done = await reset
+            assert done.done, done.why
+            assert cell.phase is State.IDLE
+
+            camera.set("off")
+            await cell.until(lambda: cell.phase is State.HELD)
+            service.request_reset()
+            assert service.makes_itself_ready
+            assert (await cell.line.order(CommandName.SET_MODE, MANUAL)).done
+            assert not service.makes_itself_ready
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_no_run_begins_while_the_fingers_are_moved_by_hand(at_ball):
+    async def scenario():
+        async with at_ball() as (cell, panel, _):
+            service = cell.station.service
+            cell.twin.boards["gripper"].set("stuck")
+            jog = JogGripper(to="width", width_mm=40.0, actor=MAX)
+            jogging = asyncio.create_task(panel.request(jog, Jogged, deadline_s=60))
+            await cell.until(lambda: service.manual_activity == JOGGING())
+            seen = await panel.request(GetCalibration(), CalibrationState, deadline_s=20)
+            assert seen.run_refused == UNDER_WAY(activity=JOGGING())
+            await asyncio.gather(jogging, return_exceptions=True)
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_a_reset_that_waited_for_the_disk_while_a_run_began_moves_nothing(at_ball, monkeypatch):
+    begun, written = threading.Event(), threading.Event()
+    write = StateFiles.write
+
+    def slow(self, name, data):
+        begun.set()
+        assert written.wait(60)
+        return write(self, name, data)
+
+    async def scenario():
+        async with at_ball() as (cell, panel, entered):
+            await stop(panel)
+            monkeypatch.setattr(StateFiles, "write", slow)
+            reset = asyncio.create_task(cell.line.order(CommandName.RESET))
+            await cell.until(begun.is_set)
+            await start_run(panel)
+            written.set()
+            refused = await reset
+            assert (refused.done, refused.why) == (False, UNDER_WAY(activity=A_CALIBRATION()))
+            await cell.station.service.runner.taken()
+            assert entered == [State.STOPPED]
+            await end_run(panel)
+
+    asyncio.run(scenario())
