@@ -265,8 +265,10 @@ class Service:
         if state in {State.LATCHED, State.CARRIED}:
             self._automatic_reset = self._reset_given = False
         if state is State.IDLE:
-            self._automatic_reset, self._reset_given = self._settings.automatic_reset, False
             self.alarms.clear(AlarmId.FRUIT_HELD)
+            if self._reset_given:
+                self.alarms.reset()
+            self._automatic_reset, self._reset_given = self._settings.automatic_reset, False
         if state is State.STOPPED and self.makes_itself_ready:
             self.runner.post(Event.RESET)
 

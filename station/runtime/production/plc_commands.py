@@ -266,6 +266,7 @@ class PlcCommands:
         if service.stopped_by_person:
             return messages.STOPPED_MEANWHILE()
         if state in {State.IDLE, State.RETREATING_READY}:
+            service.alarms.reset()
             return None
         service.request_reset()
         self._devices.confirm_clear()
@@ -294,10 +295,7 @@ class PlcCommands:
         )
         if service.stopped_by_person:
             return messages.STOPPED_MEANWHILE()
-        if reached is not State.IDLE:
-            return self._activity()
-        service.alarms.reset()
-        return None
+        return None if reached is State.IDLE else self._activity()
 
     def _activity(self) -> Message:
         faults = list(self._devices.faults.values())

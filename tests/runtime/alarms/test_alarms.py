@@ -12,6 +12,7 @@ from station.inspection.alarm_table import AlarmId
 from station.inspection.alarms import CAUSED
 from station.inspection.states import State
 from station.messages import commands
+from station.runtime.production import plc_commands
 from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, publish
 
 # No alarm more than twice: one that comes a third time within a minute chatters, and stays.
@@ -171,6 +172,43 @@ def test_an_emergency_stop_that_the_gripper_tells_of_is_a_persons(bench, until):
             assert done.done, done.why
             await cell.line.ready()
             assert AlarmId.EMERGENCY_STOP not in active(cell)
+
+    asyncio.run(scenario())
+
+
+def test_a_reset_that_a_lost_camera_delays_ends_the_stops_alarm_once_the_station_is_ready(bench, until, monkeypatch):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            cell.twin.boards["gripper"].set("emergency_stopped")
+            await cell.reach(State.LATCHED)
+            cell.twin.boards["camera"].set("off")
+            await until(lambda: "camera" in cell.station.service._devices.faults)
+            cell.twin.boards["gripper"].clear()
+            await until(lambda: not caused(cell, AlarmId.EMERGENCY_STOP))
+            monkeypatch.setattr(plc_commands, "DEADLINE_S", 0.5)
+            late = await cell.line.order(CommandName.RESET)
+            assert not late.done
+            assert late.why.id == commands.TOO_SLOW.id
+            assert AlarmId.EMERGENCY_STOP in active(cell)
+            cell.twin.boards["camera"].clear()
+            await cell.reach(State.IDLE)
+            assert AlarmId.EMERGENCY_STOP not in active(cell)
+
+    asyncio.run(scenario())
+
+
+def test_a_reset_of_a_ready_station_ends_what_is_latched(bench):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            alarms = cell.station.service.alarms
+            # As after a stop that came so often that its alarm outlasted the reset: it chattered.
+            alarms.raise_(AlarmId.PROTECTIVE_STOP, None)
+            alarms.clear(AlarmId.PROTECTIVE_STOP)
+            assert AlarmId.PROTECTIVE_STOP in active(cell)
+            assert (await cell.line.order(CommandName.RESET)).done
+            assert AlarmId.PROTECTIVE_STOP not in active(cell)
 
     asyncio.run(scenario())
 
