@@ -56,6 +56,7 @@ class PlcInterfaceServer:
         lot = self._lots.lot_of(request.lot)
         if refusal is None and not await self._lots.begin(lot):
             refusal = Refusal.NOT_READY
+        refusal = refusal or self._interlock.refusal()[0]  # the mode may have changed while the lot began
         return await self._service.begin(request, refusal, lot)
 
     async def _outcome(self, request: AwaitOutcome) -> Outcome:

@@ -1,8 +1,10 @@
 """A lot keeps the recipe that it began with, whatever people do to the recipes meanwhile; all of it is in the trail."""
 
 import asyncio
+import threading
 
 from station.channel.line import Begin, BeginReply, CommandName
+from station.inspection.states import State
 from station.messages import lots, recipes
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
@@ -65,6 +67,31 @@ def test_edits_and_approvals_within_a_lot_concern_the_next_one(bench):
     assert actions.count("lot.refused") == 1
     for action in ("service.started", "service.ended", "command.change_recipe", "recipe.approved", "recipe.retired"):
         assert action in actions
+
+
+def test_a_trigger_during_whose_lots_begin_the_mode_was_changed_is_refused(bench, monkeypatch):
+    storing, stored = threading.Event(), threading.Event()
+
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            recipes = cell.station.recipes
+            store_active = recipes.store_active
+
+            def slow(*of):
+                storing.set()
+                assert stored.wait(60)
+                return store_active(*of)
+
+            monkeypatch.setattr(recipes, "store_active", slow)
+            beginning = asyncio.create_task(begin(cell, 900, "LOT 2"))
+            assert await asyncio.to_thread(storing.wait, 60)
+            assert (await cell.line.order(CommandName.SET_MODE, 3)).done
+            stored.set()
+            assert (await beginning).refusal is Refusal.NOT_READY
+            assert cell.phase is State.IDLE
+
+    asyncio.run(scenario())
 
 
 async def begin(cell, trigger_id, lot):
