@@ -74,8 +74,8 @@ class PendingTrigger:
 
     def __init__(self, request: Begin, inspection: Inspection) -> None:
         self.request, self.inspection = request, inspection
-        self.recording: asyncio.Future[int] | None = None
-        """Task that makes it durable; when it is cancelled, the record is withdrawn."""
+        self.recording: asyncio.Future[None] | None = None
+        """Task that makes it durable and numbers it; when it is cancelled, the record is withdrawn."""
         self._answer: asyncio.Future[BeginReply] = asyncio.get_running_loop().create_future()
 
     @property

@@ -80,9 +80,13 @@ class InspectionRegistry:
         Raises:
             RecordsError: the trigger could not be stored.
         """
-        pending.recording = asyncio.ensure_future(self.records.begin(pending.inspection.trigger))
+
+        async def record() -> None:  # until it has set the number, the trigger can be withdrawn
+            pending.inspection.sequence = await self.records.begin(pending.inspection.trigger)
+
+        pending.recording = asyncio.ensure_future(record())
         try:
-            pending.inspection.sequence = await pending.recording
+            await pending.recording
         except RecordsError as error:
             self.fault = error
             raise
