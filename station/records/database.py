@@ -188,6 +188,22 @@ def _backed_up(folder: Path, revision: str) -> Path:
     return backup
 
 
+def existing(folder: Path) -> Path:
+    """Return the path of a folder's database.
+
+    Raises:
+        RecordsError: there is none, or the folder cannot be entered.
+    """
+    path = folder / FILE_NAME
+    try:
+        path.stat()
+    except FileNotFoundError:
+        raise RecordsError(messages.NO_RECORDS(path=str(path)), messages.GIVE_HOME()) from None
+    except OSError as error:
+        raise map_error(error, str(path)) from error
+    return path
+
+
 @contextmanager
 def reading(folder: Path) -> Iterator[Connection]:
     """Open a connection that cannot write, for another thread or process than the writer's.
@@ -195,9 +211,7 @@ def reading(folder: Path) -> Iterator[Connection]:
     Raises:
         RecordsError: there are no records, or they cannot be read.
     """
-    path = folder / FILE_NAME
-    if not path.exists():
-        raise RecordsError(messages.NO_RECORDS(path=str(path)), messages.GIVE_HOME())
+    path = existing(folder)
     try:
         with open_engine(path, "ro").connect() as connection:
             yield connection

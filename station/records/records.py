@@ -18,6 +18,7 @@ from station.messages import records as messages
 from station.messages.message import Message
 from station.records.audit import AuditEntry, AuditRow, append_audit
 from station.records.database import FILE_NAME, check, reading
+from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, DiskFullError, RecordsClosedError, RecordsDeadlineError, RecordsError
 from station.records.images import MB, accepted_is_stored
 from station.records.model import AlarmEntry, AlarmRow, FullRecord, InspectionRecord, OpenInspections, Trigger
@@ -153,8 +154,12 @@ class Records:
         path = self.folder / FILE_NAME
 
         def find() -> None:
-            if not path.exists():
-                raise DamagedError(messages.REMOVED(path=str(path)), messages.OPEN_AGAIN())
+            try:
+                path.stat()
+            except FileNotFoundError:
+                raise DamagedError(messages.REMOVED(path=str(path)), messages.OPEN_AGAIN()) from None
+            except OSError as error:
+                raise map_error(error, str(path)) from error
             check(path, DAMAGE_S)
 
         await asyncio.get_running_loop().run_in_executor(self._helper, find)
@@ -323,7 +328,7 @@ class Records:
             queue=opened.writer.waiting if opened else 0,
             images_waiting=opened.images.waiting if opened else 0,
             images=dict(opened.images.results) if opened else {},
-            database_bytes=sum(file.stat().st_size for file in self._files if file.exists()),
+            database_bytes=sum(map(_size_bytes, self._files)),
             image_bytes=opened.images.size_bytes if opened else 0,
             free_bytes=free_bytes,
             last_write_age_s=None if written_s is None else time.monotonic() - written_s,
@@ -361,3 +366,10 @@ class Records:
             raise RecordsDeadlineError(
                 messages.NO_ANSWER(limit_s=READING_S), messages.CHECK_DISK_AND_REPEAT()
             ) from None
+
+
+def _size_bytes(file: Path) -> int:
+    """Return a file's size; 0 for none, and for one that cannot be read: SQLite removes its log at any time."""
+    with contextlib.suppress(OSError):
+        return file.stat().st_size
+    return 0

@@ -6,10 +6,9 @@ from pathlib import Path
 
 from sqlalchemy import Connection
 
-from station.messages import records as messages
 from station.records.audit import newer_head
 from station.records.audit_head import read_head, try_save_head
-from station.records.database import FILE_NAME, open_engine
+from station.records.database import existing, open_engine
 from station.records.error_mapping import map_error
 from station.records.errors import RecordsError
 
@@ -21,9 +20,7 @@ def short_transaction(folder: Path) -> Iterator[Connection]:
     Raises:
         RecordsError: there are no records, or they cannot be changed.
     """
-    path = folder / FILE_NAME
-    if not path.exists():
-        raise RecordsError(messages.NO_RECORDS(path=str(path)), messages.GIVE_HOME())
+    path = existing(folder)
     try:
         with open_engine(path, "rw").begin() as connection:
             yield connection

@@ -8,7 +8,7 @@ import resource
 import sqlite3
 import subprocess
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,7 +34,11 @@ from station.records.high_water_mark import HighWaterMark
 from station.records.model import RecipeSnapshot, Trigger
 from station.records.open import MARK_NAME
 from station.records.records import Records
+from station.records.short_transaction import short_transaction
 from tests.records.causes import because
+
+NOBODY = 65_534
+"""The user without rights, by convention of the kernel (/proc/sys/kernel/overflowuid)."""
 
 
 def bulky(trigger: Trigger, size_bytes: int) -> Trigger:
@@ -429,3 +433,45 @@ def test_a_torn_mark_costs_at_most_the_write_that_tore_it(tmp_path, cut):
     path.write_bytes(torn)
     assert HighWaterMark(path).value in {11, 12}
     assert HighWaterMark(path).known
+
+
+@contextlib.contextmanager
+def no_permission(folder: Path) -> Iterator[None]:
+    """A folder that the station's user may not enter, as one that root put back; root itself becomes nobody."""
+    folder.chmod(0)
+    if os.geteuid() == 0:
+        os.seteuid(NOBODY)
+    try:
+        yield
+    finally:
+        os.seteuid(os.getuid())
+        folder.chmod(0o700)
+
+
+def test_a_folder_that_cannot_be_entered_is_an_error_of_the_records(opened, scenario, folder):
+    async def steps():
+        async with opened() as records:
+            assert records.status().database_bytes > 0
+            with no_permission(folder):
+                assert records.status().database_bytes == 0
+                with pytest.raises(ReadOnlyError, check=because(messages.NOT_WRITABLE)):
+                    await records.find_damage()
+                with pytest.raises(ReadOnlyError, check=because(messages.NOT_WRITABLE)):
+                    await records.inspection(1)
+                with pytest.raises(ReadOnlyError, check=because(messages.NOT_WRITABLE)), short_transaction(folder):
+                    pass
+            await records.find_damage()
+
+    scenario(steps)
+
+
+def test_a_file_that_vanishes_while_it_is_looked_at_has_no_size(opened, scenario, folder, monkeypatch):
+    async def steps():
+        async with opened() as records:
+            await records.close()
+            (folder / FILE_NAME).unlink()
+            monkeypatch.setattr(Path, "exists", lambda _: True)
+            assert records.status().database_bytes == 0
+            monkeypatch.undo()
+
+    scenario(steps)
