@@ -44,15 +44,27 @@ class CalibrationStore:
         Raises:
             CalibrationError: it could not be written; nothing is left of it.
         """
-        return self._add(CALIBRATIONS, calibration.serial, calibration.id, calibration, files)
+        return self.prepare_calibration(calibration, files).put_in_force()
+
+    def prepare_calibration(self, calibration: Calibration, files: Mapping[str, bytes]) -> "Prepared":
+        """Write a calibration with all its files, which takes the disk its time; it is not in force yet.
+
+        Raises:
+            CalibrationError: it could not be written; nothing is left of it.
+        """
+        return self._prepare(CALIBRATIONS, calibration.serial, calibration.id, calibration, files)
 
     def add_verification(self, verification: Verification, files: Mapping[str, bytes]) -> Path:
         """Store a verification, as `add_calibration`."""
-        return self._add(VERIFICATIONS, verification.serial, verification.id, verification, files)
+        return self.prepare_verification(verification, files).put_in_force()
+
+    def prepare_verification(self, verification: Verification, files: Mapping[str, bytes]) -> "Prepared":
+        """Write a verification, as `prepare_calibration`."""
+        return self._prepare(VERIFICATIONS, verification.serial, verification.id, verification, files)
 
     def add_refusal(self, refusal: Refusal, files: Mapping[str, bytes]) -> Path:
         """Store a refused calibration for a person to inspect, as `add_calibration`. It is never used."""
-        return self._add(REFUSALS, refusal.serial, refusal.id, refusal, files)
+        return self._prepare(REFUSALS, refusal.serial, refusal.id, refusal, files).put_in_force()
 
     def serials(self) -> tuple[str, ...]:
         """Return the units that were ever calibrated."""
@@ -108,7 +120,7 @@ class CalibrationStore:
                     return calibration
         raise UnknownCalibrationError(messages.UNKNOWN(name=repr(name)))
 
-    def _add(self, kind: str, serial: str, name: str, record: Stored, files: Mapping[str, bytes]) -> Path:
+    def _prepare(self, kind: str, serial: str, name: str, record: Stored, files: Mapping[str, bytes]) -> "Prepared":
         folder = self._home / kind / _SERIAL.validate_python(serial)
         unfinished: Path | None = None
         try:
@@ -120,13 +132,11 @@ class CalibrationStore:
             for file, data in {**files, RECORDS[kind]: record.model_dump_json(indent=1).encode()}.items():
                 _write(unfinished / file, data)
             sync_folder(unfinished)
-            unfinished.rename(folder / name)
-            sync_folder(folder)
         except OSError as error:
             if unfinished is not None:
                 shutil.rmtree(unfinished, ignore_errors=True)
-            raise CalibrationError(messages.NOT_STORED(folder=str(folder / name), error=str(error.strerror))) from error
-        return folder / name
+            raise _not_stored(folder / name, error) from error
+        return Prepared(unfinished, folder / name)
 
     def _all(self, kind: str, serial: str, model: type[RecordT]):  # noqa: ANN202 (an iterator of the model)
         with contextlib.suppress(ValidationError):
@@ -135,6 +145,41 @@ class CalibrationStore:
                 with contextlib.suppress(OSError, ValidationError):
                     _NAME.validate_python(path.name)
                     yield model.model_validate_json((path / RECORDS[kind]).read_bytes())
+
+
+class Prepared:
+    """A record that is complete and durable, and not in force yet."""
+
+    def __init__(self, unfinished: Path, folder: Path) -> None:
+        self._unfinished, self._folder = unfinished, folder
+        self._in_force = False
+
+    def put_in_force(self) -> Path:
+        """Put the record in force by its folder's name alone, and return the folder.
+
+        Raises:
+            CalibrationError: it could not be; nothing is left of it.
+        """
+        try:
+            self._unfinished.rename(self._folder)
+            self._in_force = True
+            sync_folder(self._folder.parent)
+        except OSError as error:
+            self.discard()
+            raise _not_stored(self._folder, error) from error
+        return self._folder
+
+    def discard(self) -> None:
+        """Remove the record, also one that is in force. Idempotent."""
+        if self._in_force:
+            with contextlib.suppress(OSError):
+                self._folder.rename(self._unfinished)  # whole at once: a reader never finds a part of it
+            self._in_force = False
+        shutil.rmtree(self._unfinished, ignore_errors=True)
+
+
+def _not_stored(folder: Path, error: OSError) -> CalibrationError:
+    return CalibrationError(messages.NOT_STORED(folder=str(folder), error=str(error.strerror)))
 
 
 def press_name(number: int) -> str:

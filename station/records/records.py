@@ -315,6 +315,10 @@ class Records:
         """
         return await self._ask(work)
 
+    async def change_to_end(self, work: Work[T]) -> T:
+        """As `change`, with no deadline: the answer is what the records have, whatever time the disk takes."""
+        return await asyncio.wrap_future(self._get().writer.submit(work))
+
     def status(self) -> Status:
         """Return the state of the records; never waits."""
         opened = self._opened

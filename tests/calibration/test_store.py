@@ -101,3 +101,18 @@ def test_what_a_killed_one_left_is_never_seen_and_swept_away(store, draft, tmp_p
     assert store.serials() == ("T0001",)
     store.add_calibration(draft.calibration, {})
     assert not left.exists()
+
+
+def test_a_prepared_one_is_in_force_by_its_folders_name_alone_and_can_be_taken_back(store, draft, tmp_path):
+    prepared = store.prepare_calibration(draft.calibration, {})
+    assert store.current("T0001") is None
+    prepared.put_in_force()
+    assert store.current("T0001") == draft.calibration
+    twice = store.prepare_calibration(draft.calibration, {})
+    with pytest.raises(CalibrationError, match=draft.calibration.id):
+        twice.put_in_force()
+    twice.discard()
+    assert store.current("T0001") == draft.calibration, "another one's folder is not its own"
+    prepared.discard()
+    prepared.discard()
+    assert list((tmp_path / CALIBRATIONS / "T0001").iterdir()) == []

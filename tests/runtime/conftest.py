@@ -37,9 +37,12 @@ from station.channel.line import (
 from station.devices.gripper import robotiq
 from station.inspection.states import State
 from station.messages.message import verbatim
+from station.runtime.rpc.maintenance import MANUAL
 from station.runtime.station import Station
 from station.settings.configuration import Configuration, load_configuration
+from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
+from station.settings.recipe import load_recipes
 from station.twin.digit import server
 from station.twin.process import Twin, TwinOptions
 from station.twin.robotiq import model
@@ -273,6 +276,41 @@ def bench(
             station.stop()
             await running
             await twin.stop()
+
+    return begin
+
+
+@pytest.fixture
+def at_ball(
+    bench: Callable[..., contextlib.AbstractAsyncContextManager[Bench]],
+    settings_file: Callable[..., Path],
+    tmp_path: Path,
+) -> Callable[..., contextlib.AbstractAsyncContextManager[tuple[Bench, ChannelClient, list[State]]]]:
+    """A ready station with the ball in its nest, in manual mode, its panel, and the states that it enters then."""
+
+    @contextlib.asynccontextmanager
+    async def begin(**service: Any) -> AsyncIterator[tuple[Bench, ChannelClient, list[State]]]:
+        file = settings_file(**service)
+        values = load_recipes()["rubber_ball"].model_dump(mode="json")
+        values["imaging"]["frames_per_step"] = 1
+        (tmp_path / "recipes" / "rubber_ball.yaml").write_text(json.dumps(values))
+        async with bench(file) as cell:
+            await cell.line.order(CommandName.RESET)  # on a bench a person first says that the jaws are clear
+            await cell.until(lambda: cell.phase is State.IDLE, patience_s=150)
+            cell.lay("rubber_ball")
+            assert (await cell.line.order(CommandName.SET_MODE, MANUAL)).done
+            runs, entered = cell.station.service, list[State]()
+            assert runs is not None
+            note = runs.entered
+
+            def noted(state: State, after: State, took_s: float) -> None:
+                note(state, after, took_s)
+                entered.append(state)
+
+            runs.entered = noted
+            endpoint = panel_endpoint(cell.configuration.hmi, cell.configuration.home)
+            async with ChannelClient(endpoint, "the station") as panel:
+                yield cell, panel, entered
 
     return begin
 

@@ -13,7 +13,7 @@ from station.calibration.checks import check_name, failed_check
 from station.calibration.model import Calibration, Verification
 from station.calibration.report import calibration_files, verification_files
 from station.calibration.rig import Place, Progress, Unit
-from station.calibration.store import CalibrationStore
+from station.calibration.store import CalibrationStore, Prepared
 from station.calibration.verification_procedure import VerificationProcedure
 from station.channel.panel import Actor
 from station.channel.panel_maintenance_queries import (
@@ -201,9 +201,7 @@ class PanelCalibration:
         entry = calibration_entry(
             run.actor.who, "", f"sensor {new.serial}", None if before is None else before.id, new.id
         )
-        await self._records.change(
-            lambda connection: (append_audit(connection, entry), self._store.add_calibration(new, files))
-        )
+        await self._put_in_force(entry, lambda: self._store.prepare_calibration(new, files))
 
     async def _verify(self, run: _Run) -> Message | None:
         calibration = self._devices.calibration.calibration
@@ -229,11 +227,28 @@ class PanelCalibration:
         entry = verification_entry(
             run.actor.who, f"sensor {calibration.serial}", calibration.id, made.id, passed=made.passed
         )
-        await self._records.change(
-            lambda connection: (append_audit(connection, entry), self._store.add_verification(made, files))
-        )
+        await self._put_in_force(entry, lambda: self._store.prepare_verification(made, files))
         failed = [failed_check(check) for check in made.checks if not check.passed]
         return joined(failed) if failed else None
+
+    async def _put_in_force(self, entry: AuditEntry, prepare: Callable[[], Prepared]) -> None:
+        """Put a record in force together with its audit entry; once begun it comes to its end, also when called off.
+
+        Raises:
+            StationError: neither is stored.
+        """
+        prepared = await asyncio.to_thread(prepare)
+        storing = asyncio.create_task(
+            self._records.change_to_end(lambda connection: (append_audit(connection, entry), prepared.put_in_force()))
+        )
+        while not storing.done():
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.wait({storing})
+        try:
+            storing.result()
+        except StationError:
+            await asyncio.to_thread(prepared.discard)
+            raise
 
     async def _lay(self, run: _Run, place: Place) -> None:
         """Request the ball from the person, and wait until it is in place."""

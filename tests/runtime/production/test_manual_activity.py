@@ -1,97 +1,21 @@
 """While a person calibrates in manual mode, nothing but the procedure moves: no reset, by whomever or by itself."""
 
 import asyncio
-import contextlib
-import json
 import threading
 
 import pytest
 
-from station.channel.client import ChannelClient
 from station.channel.line import CommandName
-from station.channel.panel import Actor
-from station.channel.panel_live import (
-    GetPanelState,
-    OperatorCommand,
-    OperatorCommandName,
-    OperatorCommandView,
-    PanelState,
-)
-from station.channel.panel_maintenance_queries import (
-    CalibrationRunView,
-    CalibrationState,
-    EndCalibrationRun,
-    GetCalibration,
-    Jogged,
-    JogGripper,
-    StartCalibrationRun,
-)
+from station.channel.panel_live import GetPanelState, OperatorCommandName, PanelState
+from station.channel.panel_maintenance_queries import CalibrationState, GetCalibration, Jogged, JogGripper
 from station.inspection.states import State
 from station.messages.calibration import A_CALIBRATION, STEP_PRESS
 from station.messages.commands import JOGGING
 from station.messages.maintenance import UNDER_WAY
 from station.runtime.devices.manager import CAMERA, GRIPPER
+from station.runtime.rpc.maintenance import MANUAL
 from station.runtime.state_files import StateFiles
-from station.settings.hmi import panel_endpoint
-from station.settings.recipe import load_recipes
-
-MAX = Actor(who="Max", role="maintenance")
-MANUAL = 3
-PLACES = ((-2.5, 0.0),)
-
-
-@pytest.fixture
-def at_ball(bench, settings_file, tmp_path):
-    """A ready station with the ball in its nest, in manual mode, its panel, and the states that it enters then."""
-
-    @contextlib.asynccontextmanager
-    async def begin(**service):
-        file = settings_file(**service)
-        values = load_recipes()["rubber_ball"].model_dump(mode="json")
-        values["imaging"]["frames_per_step"] = 1
-        (tmp_path / "recipes" / "rubber_ball.yaml").write_text(json.dumps(values))
-        async with bench(file) as cell:
-            await cell.line.order(CommandName.RESET)  # on a bench a person first says that the jaws are clear
-            await cell.until(lambda: cell.phase is State.IDLE, patience_s=150)
-            cell.lay("rubber_ball")
-            assert (await cell.line.order(CommandName.SET_MODE, MANUAL)).done
-            service, entered = cell.station.service, []
-            note = service.entered
-            service.entered = lambda state, *of: (note(state, *of), entered.append(state))
-            endpoint = panel_endpoint(cell.configuration.hmi, cell.configuration.home)
-            async with ChannelClient(endpoint, "the station") as panel:
-                yield cell, panel, entered
-
-    return begin
-
-
-async def stop(panel):
-    order = OperatorCommand(person=MAX, order=OperatorCommandName.STOP)
-    assert (await panel.request(order, OperatorCommandView, deadline_s=20)).state == "done"
-
-
-async def start_run(panel):
-    request = StartCalibrationRun(kind="calibration", places=PLACES, actor=MAX)
-    await panel.request(request, CalibrationRunView, deadline_s=20)
-
-
-async def run_now(panel):
-    return (await panel.request(GetCalibration(), CalibrationState, deadline_s=20)).run
-
-
-async def until_waits(cell, panel):
-    """Wait until the run has pressed the ball, and the person lays it at another place: hands are in the cell."""
-
-    async def waits():
-        run = await run_now(panel)
-        assert run.state in {"running", "waiting"}, run
-        return run.state == "waiting"
-
-    await cell.until(waits)
-
-
-async def end_run(panel):
-    assert (await panel.request(EndCalibrationRun(actor=MAX), CalibrationRunView, deadline_s=60)).state == "ended"
+from tests.runtime.ball import MAX, end_run, run_now, start_run, stop, until_waits
 
 
 @pytest.mark.timeout(300)
@@ -112,7 +36,7 @@ def test_a_reset_while_the_ball_is_pressed_is_refused_and_moves_nothing(at_ball)
             assert cell.station.service.stopped_by_person, "the person's stop is still in force"
             await until_waits(cell, panel)
             assert entered == [State.STOPPED]
-            await end_run(panel)
+            assert (await end_run(panel)).state == "ended"
             done = await cell.line.order(CommandName.RESET)
             assert done.done, done.why
             assert cell.phase is State.IDLE

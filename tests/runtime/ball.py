@@ -1,0 +1,53 @@
+"""A calibration at the panel, as a person with the ball starts it, answers it and ends it."""
+
+from typing import Any
+
+from station.channel.client import ChannelClient
+from station.channel.panel import Actor
+from station.channel.panel_live import OperatorCommand, OperatorCommandName, OperatorCommandView
+from station.channel.panel_maintenance_queries import (
+    CalibrationRunView,
+    CalibrationState,
+    EndCalibrationRun,
+    GetCalibration,
+    StartCalibrationRun,
+)
+
+MAX = Actor(who="Max", role="maintenance")
+PLACES = ((-2.5, 0.0),)
+"""A second one, at which the run waits for the person."""
+
+
+async def stop(panel: ChannelClient) -> None:
+    """*Stop*."""
+    order = OperatorCommand(person=MAX, order=OperatorCommandName.STOP)
+    assert (await panel.request(order, OperatorCommandView, deadline_s=20)).state == "done"
+
+
+async def start_run(panel: ChannelClient, places: tuple[tuple[float, float], ...] = PLACES) -> None:
+    """*Calibrate*."""
+    request = StartCalibrationRun(kind="calibration", places=places, actor=MAX)
+    await panel.request(request, CalibrationRunView, deadline_s=20)
+
+
+async def run_now(panel: ChannelClient) -> CalibrationRunView:
+    """The run as the page shows it."""
+    run = (await panel.request(GetCalibration(), CalibrationState, deadline_s=20)).run
+    assert run is not None
+    return run
+
+
+async def until_waits(cell: Any, panel: ChannelClient) -> None:
+    """Wait until the run has pressed the ball, and the person lays it at another place: hands are in the cell."""
+
+    async def waits() -> bool:
+        run = await run_now(panel)
+        assert run.state in {"running", "waiting"}, run
+        return run.state == "waiting"
+
+    await cell.until(waits)
+
+
+async def end_run(panel: ChannelClient) -> CalibrationRunView:
+    """*Call it off*."""
+    return await panel.request(EndCalibrationRun(actor=MAX), CalibrationRunView, deadline_s=60)
