@@ -206,7 +206,8 @@ CONFIGURATION_BROKEN = AlarmTexts(
     define("alarm.consequence.configuration_broken", "The last good configuration is used."),
     define(
         "alarm.action.configuration_broken",
-        "Correct the line that the detail names; `station devices check` reports whether it is good.",
+        "Correct the line that the detail names; `station devices check` reports whether it is good. Then start the "
+        "station again.",
     ),
 )
 RECIPE_BROKEN = AlarmTexts(
