@@ -43,8 +43,11 @@ class ConnectionManager:
         self.now_s = self._loop.time
         self._readers, self._writers = AllowList(settings.readers), AllowList(settings.writers)
         self._members: dict[Peer, Member] = {}
+        self._handshakes: dict[Member, Peer] = {}
+        """Clients of the TLS port that have a place and no identity yet."""
         self._log = LimitedLog(log)
         self._sweeping: asyncio.TimerHandle | None = None
+        self._is_closed = False
         self.write_lock = WriteLock(settings.writer_lease_s, self._report_writer)
         self._handler = RequestHandler(
             settings.unit, image, on_write, self._claim, self.write_lock.owned_by, self.write_lock.release
@@ -61,30 +64,34 @@ class ConnectionManager:
         self._sweeping = self._loop.call_later(SWEEP_S, self._sweep)
 
     def close(self) -> None:
-        """Close all connections. Idempotent."""
+        """Close all connections, and admit none any more. Idempotent."""
+        self._is_closed = True
         if self._sweeping is not None:
             self._sweeping.cancel()
         for member in tuple(self._members.values()):
             member.drop()
+        self._handshakes.clear()
         self._log.sum_up(self.now_s(), last=True)
+
+    def enter(self, member: Member, transport: asyncio.Transport) -> bool:
+        """Give a client a place for its TLS handshake, by its address alone; return False if it is refused."""
+        peer, right = self._identify(transport)
+        if peer is None or not self._permits(peer, right):
+            return False
+        self._handshakes[member] = peer
+        return True
+
+    def leave(self, member: Member, why: str) -> None:
+        """Free a client's place at the end of its TLS handshake; `why` it failed, empty if it did not."""
+        peer = self._handshakes.pop(member, None)
+        if peer is not None and why:
+            self.note(Trouble.NO_HANDSHAKE, peer, f"its TLS handshake failed ({why}): its connection is closed")
 
     def admit(self, member: Member, transport: asyncio.Transport) -> Peer | None:
         """Return the connection's peer, or None if it is refused."""
-        name = transport.get_extra_info("peername")
-        if not name:
-            return None
-        address, port = plain_address(name[0]), name[1]
-        subject, right = identity_of(transport.get_extra_info("ssl_object"))
-        may_write = right is Right.WRITE and self._writers.allows(address)
-        peer = Peer(address, port, may_write, subject)
-        if not self._readers.allows(address):
-            self.note(Trouble.NOT_ALLOWED, peer, "it is not in modbus.readers: its connection is closed")
-            return None
-        if right is Right.NONE:
-            self.note(Trouble.NOT_ALLOWED, peer, "its certificate has no role known here: its connection is closed")
-            return None
-        if (full := self._full(peer)) and not self._has_reserve(peer):
-            self.note(Trouble.TOO_MANY, peer, f"{full}: its connection is closed")
+        peer, right = self._identify(transport)
+        self._handshakes.pop(member, None)  # it needs no second place
+        if peer is None or not self._permits(peer, right):
             return None
         self._members[peer] = member
         self.statistics.connections += 1
@@ -117,6 +124,30 @@ class ConnectionManager:
         self.statistics.troubles[trouble] += 1
         self._log.write(trouble, self.now_s(), logging.WARNING, "%s: %s", peer, why)
 
+    def _identify(self, transport: asyncio.Transport) -> tuple[Peer | None, Right]:
+        """Return a connection's other end, None if it is gone already, and its right by its certificate, if any."""
+        name = transport.get_extra_info("peername")
+        subject, right = identity_of(transport.get_extra_info("ssl_object"))
+        if not name:
+            return None, right
+        address, port = plain_address(name[0]), name[1]
+        return Peer(address, port, right is Right.WRITE and self._writers.allows(address), subject), right
+
+    def _permits(self, peer: Peer, right: Right) -> bool:
+        """Return whether a client may be connected; count and log it if not."""
+        if self._is_closed:  # it was accepted, or ended its handshake, meanwhile
+            return False
+        if not self._readers.allows(peer.address):
+            self.note(Trouble.NOT_ALLOWED, peer, "it is not in modbus.readers: its connection is closed")
+            return False
+        if right is Right.NONE:
+            self.note(Trouble.NOT_ALLOWED, peer, "its certificate has no role known here: its connection is closed")
+            return False
+        if (full := self._full(peer)) and not self._has_reserve(peer):
+            self.note(Trouble.TOO_MANY, peer, f"{full}: its connection is closed")
+            return False
+        return True
+
     def _claim(self, peer: Peer) -> bool:
         holder = self._members.get(self.write_lock.holder) if self.write_lock.holder else None
         return self.write_lock.claim(peer, self.now_s(), holder.heard_s if holder else 0.0)
@@ -131,17 +162,21 @@ class ConnectionManager:
 
     def _full(self, peer: Peer) -> str:
         """Return why there is no place for a client; empty where there is one."""
-        if len(self._members) >= self._settings.max_connections:
-            return f"{len(self._members)} are connected"
+        if self._taken >= self._settings.max_connections:
+            return f"{self._taken} are connected"
         own = self._own(peer)
         return f"{own} of its address are connected" if own >= self._settings.max_per_address else ""
 
+    @property
+    def _taken(self) -> int:
+        return len(self._members) + len(self._handshakes)
+
     def _own(self, peer: Peer) -> int:
-        return sum(other.address == peer.address for other in self._members)
+        return sum(other.address == peer.address for other in (*self._members, *self._handshakes.values()))
 
     def _has_reserve(self, peer: Peer) -> bool:
         settings = self._settings
-        if not peer.may_write or len(self._members) >= settings.max_connections + RESERVED_PLACES:
+        if not peer.may_write or self._taken >= settings.max_connections + RESERVED_PLACES:
             return False
         if self._own(peer) >= settings.max_per_address + RESERVED_PLACES:
             return False

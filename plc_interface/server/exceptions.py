@@ -31,13 +31,21 @@ class Trouble(StrEnum):
     DEVICE_FAILURE = "internal faults"
     NOT_ALLOWED = "connections not allowed"
     TOO_MANY = "connections over the limit"
+    NO_HANDSHAKE = "failed TLS handshakes"
     IDLE = "idle connections"
     UNFINISHED = "unfinished requests"
     SLOW_READER = "replies not taken"
 
 
 CONNECTION_TROUBLES = frozenset(
-    (Trouble.NOT_ALLOWED, Trouble.TOO_MANY, Trouble.IDLE, Trouble.UNFINISHED, Trouble.SLOW_READER)
+    (
+        Trouble.NOT_ALLOWED,
+        Trouble.TOO_MANY,
+        Trouble.NO_HANDSHAKE,
+        Trouble.IDLE,
+        Trouble.UNFINISHED,
+        Trouble.SLOW_READER,
+    )
 )
 """Those for which a connection was refused or closed by a limit; the others answer or end on a bad request."""
 

@@ -3,7 +3,7 @@
 import asyncio
 import errno
 import socket
-import ssl
+from collections.abc import Callable
 from functools import partial
 
 from plc_interface.server.connection import Connection
@@ -13,6 +13,7 @@ from plc_interface.server.peer import Peer
 from plc_interface.server.request_handler import OnWrite
 from plc_interface.server.statistics import Statistics
 from plc_interface.server.tls import server_context
+from plc_interface.server.tls_handshakes import TlsHandshakes
 from plc_interface.server.write_lock import OnWriter
 from station.errors import StationError
 from station.settings.modbus import ModbusSettings
@@ -43,6 +44,7 @@ class ModbusServer:
         self._settings = settings
         self._manager = ConnectionManager(settings, image, on_write, on_writer)
         self._listeners: list[asyncio.Server] = []
+        self._handshakes: TlsHandshakes | None = None
 
     @property
     def statistics(self) -> Statistics:
@@ -66,11 +68,12 @@ class ModbusServer:
             StationError: a port in use or without the right to it, an address that is not ours, a bad certificate.
         """
         settings, tls = self._settings, self._settings.tls
-        context = server_context(tls) if tls.enabled else None
-        await self._listen("modbus", settings.port, None)
+        if tls.enabled:
+            self._handshakes = TlsHandshakes(self._manager, server_context(tls), settings.frame_timeout_s)
+        await self._listen("modbus", settings.port, partial(Connection, self._manager))
         try:
-            if context is not None:
-                await self._listen("modbus.tls", tls.port, context)
+            if (handshakes := self._handshakes) is not None:
+                await self._listen("modbus.tls", tls.port, lambda: handshakes)
         except StationError:
             await self.stop()
             raise
@@ -82,21 +85,14 @@ class ModbusServer:
             listener.close()
         self._listeners.clear()
         self._manager.close()
+        if self._handshakes is not None:
+            await self._handshakes.close()
         await asyncio.sleep(0)
 
-    async def _listen(self, section: str, port: int, context: ssl.SSLContext | None) -> None:
-        host, connection = self._settings.host, partial(Connection, self._manager)
-        deadline_s = self._settings.frame_timeout_s if context else None
+    async def _listen(self, section: str, port: int, protocol: Callable[[], asyncio.BaseProtocol]) -> None:
+        host = self._settings.host
         try:
-            listener = await asyncio.get_running_loop().create_server(
-                connection,
-                host,
-                port,
-                backlog=BACKLOG,
-                ssl=context,
-                ssl_handshake_timeout=deadline_s,
-                ssl_shutdown_timeout=deadline_s,
-            )
+            listener = await asyncio.get_running_loop().create_server(protocol, host, port, backlog=BACKLOG)
         except OSError as error:
             raise ModbusServerError(why_not(section, host, port, error)) from error
         for listening in listener.sockets:  # who is accepted inherits it

@@ -1,6 +1,7 @@
 """A server on the wire, and a client that says exactly the bytes it is told to."""
 
 import asyncio
+import contextlib
 import logging
 import socket
 import struct
@@ -196,6 +197,27 @@ def connect(serve: Callable[..., Serving]) -> Iterator[Callable[..., Wire]]:
     yield open_
     for wire in wires:
         wire.close()
+
+
+@pytest.fixture
+def crowd() -> Iterator[Callable[[int, int, str], list[socket.socket]]]:
+    """Sockets that are closed after the test."""
+    with contextlib.ExitStack() as stack:
+
+        def come(port: int, count: int, source: str) -> list[socket.socket]:
+            arrived: list[socket.socket] = []
+            for _ in range(count):
+                client = socket.socket()
+                stack.enter_context(client)
+                client.settimeout(20.0)
+                client.bind((source, 0))
+                client.setblocking(False)
+                with contextlib.suppress(BlockingIOError):
+                    client.connect(("127.0.0.1", port))
+                arrived.append(client)
+            return arrived
+
+        yield come
 
 
 @pytest.fixture

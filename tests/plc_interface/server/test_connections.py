@@ -5,8 +5,6 @@ import socket
 import struct
 import time
 
-import pytest
-
 from plc_interface.registers.map import BY_NAME
 from plc_interface.server.connection import REQUESTS_PER_S
 from plc_interface.server.connection_manager import RESERVED_PLACES
@@ -15,27 +13,6 @@ from plc_interface.server.exceptions import Trouble
 TRIGGER_ID, REFERENCE = BY_NAME["trigger_id"].address, BY_NAME["reference_u16"].address
 READ = struct.pack(">BHH", 3, REFERENCE, 1)
 GOOD = bytes([3, 2, 0x12, 0x34])
-
-
-@pytest.fixture
-def crowd():
-    """Sockets that are closed after the test."""
-    with contextlib.ExitStack() as stack:
-
-        def come(port, count, source):
-            arrived = []
-            for _ in range(count):
-                client = socket.socket()
-                stack.enter_context(client)
-                client.settimeout(20.0)
-                client.bind((source, 0))
-                client.setblocking(False)
-                with contextlib.suppress(BlockingIOError):
-                    client.connect(("127.0.0.1", port))
-                arrived.append(client)
-            return arrived
-
-        yield come
 
 
 class TestLimit:
@@ -226,3 +203,11 @@ def test_stopping_parts_from_everybody_and_frees_the_port(serve, connect):
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         probe.bind(("127.0.0.1", serving.settings.port))
     serving.stop_server()
+
+
+def test_one_that_was_accepted_while_the_server_ends_is_not_admitted(serve, connect):
+    serving = serve()
+    serving.call(serving.server._manager.close)
+    assert connect(serving).is_closed()
+    assert not serving.server.statistics.troubles
+    assert serving.server.statistics.connections == 0

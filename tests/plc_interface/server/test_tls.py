@@ -1,6 +1,8 @@
 """Modbus over TLS: who comes in, what a role lets it do, and what is wrong with a certificate."""
 
+import asyncio
 import datetime as dt
+import gc
 import ipaddress
 import os
 import re
@@ -8,6 +10,7 @@ import shutil
 import socket
 import ssl
 import subprocess
+from asyncio.sslproto import SSLProtocol
 from pathlib import Path
 
 import pytest
@@ -81,10 +84,16 @@ def tls_port():
 
 
 @pytest.fixture
-def serving(serve, authority, tls_port):
+def settings():
+    """Modbus settings beside those of TLS."""
+    return {}
+
+
+@pytest.fixture
+def serving(serve, authority, tls_port, settings):
     certificate, key = authority.issue("station")
     files = {"certificate": certificate, "key": key, "client_authority": authority.file}
-    return serve(tls={"enabled": True, "port": tls_port, **files})
+    return serve(tls={"enabled": True, "port": tls_port, **files}, **settings)
 
 
 @pytest.fixture
@@ -184,6 +193,144 @@ class TestStrangers:
 
     def test_the_plain_port_stays_beside_it(self, connect, serving):
         assert connect(serving).read(REFERENCE, 1) == b"\x12\x34"
+
+
+def is_ended(client):
+    """Whether the server has closed a connection from which no byte is to come."""
+    try:
+        return client.recv(1) == b""
+    except BlockingIOError:
+        return False
+    except ConnectionResetError:
+        return True
+
+
+class TestSilentCrowds:
+    @pytest.fixture
+    def settings(self):
+        return {"readers": ("127.0.0.1", "127.0.0.9"), "frame_timeout_s": 60.0}
+
+    def test_they_get_the_places_of_one_address_and_keep_nobody_out(self, serving, connect, dial, crowd, authority):
+        plc, plain = dial(*authority.issue("line-plc", "writer")), connect(serving)
+        plc.claim()
+        troubles = serving.server.statistics.troubles
+        strangers = crowd(serving.settings.tls.port, 100, "127.0.0.66")
+        serving.wait(lambda: troubles[Trouble.NOT_ALLOWED] == 100)
+        silent = crowd(serving.settings.tls.port, 100, "127.0.0.9")
+        serving.wait(lambda: troubles[Trouble.TOO_MANY] == 100 - serving.settings.max_per_address)
+        serving.wait(lambda: sum(map(is_ended, strangers)) == 100)
+        serving.wait(lambda: sum(map(is_ended, silent)) == 100 - serving.settings.max_per_address)
+        assert serving.server.statistics.refused_connections == 200 - serving.settings.max_per_address
+        assert plc.write(BY_NAME["trigger_id"].address, 7)[0] == 16
+        assert plain.read(REFERENCE, 1) == b"\x12\x34"
+        assert dial(*authority.issue("scada", "reader")).read(REFERENCE, 1) == b"\x12\x34"
+        assert connect(serving).read(REFERENCE, 1) == b"\x12\x34"
+
+    def test_they_are_in_the_log_as_on_the_plain_port(self, serving, crowd, caplog):
+        crowd(serving.settings.tls.port, 1, "127.0.0.66")
+        crowd(serving.settings.tls.port, 9, "127.0.0.9")
+        serving.wait(lambda: serving.server.statistics.refused_connections == 2)
+        assert [line for line in caplog.messages if line.startswith("127.0.0.66:") and "modbus.readers" in line]
+        assert [line for line in caplog.messages if line.startswith("127.0.0.9:") and "8 of its address" in line]
+
+
+class TestHandshakes:
+    """One place for all."""
+
+    @pytest.fixture
+    def settings(self):
+        return {"max_connections": 1, "writers": (), "frame_timeout_s": 60.0}
+
+    @pytest.fixture
+    def failed(self, serving):
+        """Wait for one handshake to have failed."""
+        return lambda: serving.wait(lambda: serving.server.statistics.troubles[Trouble.NO_HANDSHAKE] == 1)
+
+    def test_one_under_way_has_a_place_on_both_ports(self, serving, connect, dial, authority, failed):
+        half = connect(serving, port=serving.settings.tls.port)
+        serving.wait(lambda: serving.server._manager._handshakes)
+        assert connect(serving).is_closed()
+        assert is_parted_from(connect(serving, port=serving.settings.tls.port))
+        assert serving.server.statistics.troubles[Trouble.TOO_MANY] == 2
+        half.close()
+        failed()
+        assert dial(*authority.issue("scada", "reader")).read(REFERENCE, 1) == b"\x12\x34"
+
+    def test_clear_text(self, serving, connect, failed, caplog):
+        wire = connect(serving, port=serving.settings.tls.port)
+        wire.send(wire.request(bytes([3, 0, REFERENCE, 0, 1])))
+        failed()
+        assert wire.is_closed()
+        assert [line for line in caplog.messages if "its TLS handshake failed" in line and "[SSL" in line]
+
+    @pytest.mark.parametrize("source", ["other authority", "expired", "none"])
+    def test_a_bad_certificate(self, dial, authority, tmp_path, failed, caplog, source):
+        (tmp_path / "other").mkdir()
+        files = {
+            "other authority": lambda: Authority(tmp_path / "other", "other").issue("line-plc", "writer"),
+            "expired": lambda: authority.issue("line-plc", "writer", until=NOW - YEAR),
+            "none": lambda: (),
+        }[source]()
+        assert is_parted_from(dial(*files))
+        failed()
+        why = {"other authority": "unable to get local issuer", "expired": "has expired", "none": "did not return a"}
+        (line,) = [line for line in caplog.messages if "its TLS handshake failed" in line]
+        assert why[source] in line
+
+    def test_one_that_goes(self, serving, connect, failed, caplog):
+        connect(serving, port=serving.settings.tls.port).close()
+        failed()
+        assert [line for line in caplog.messages if "its TLS handshake failed (the client has ended it)" in line]
+
+    def test_those_that_fail_leave_no_buffers_to_the_collector(self, serving, connect):
+        gc.collect()
+        gc.disable()
+        try:
+            for count in range(1, 6):
+                wire = connect(serving, port=serving.settings.tls.port)
+                wire.send(wire.request(bytes([3, 0, REFERENCE, 0, 1])))
+                assert wire.is_closed()
+                serving.wait(lambda count=count: serving.server.statistics.troubles[Trouble.NO_HANDSHAKE] == count)
+            serving.wait(lambda: not asyncio.all_tasks(serving.loop))
+            assert not [one for one in gc.get_objects() if isinstance(one, SSLProtocol)]
+        finally:
+            gc.enable()
+
+    def test_the_end_of_the_server_ends_them(self, serving, connect, caplog):
+        half = connect(serving, port=serving.settings.tls.port)
+        serving.wait(lambda: serving.server._manager._handshakes)
+        serving.stop_server()
+        assert half.is_closed()
+        assert not serving.call(asyncio.all_tasks, serving.loop)
+        assert not serving.server.statistics.troubles
+        assert not [record for record in caplog.records if record.name == "asyncio"]
+
+
+class TestTime:
+    @pytest.fixture
+    def settings(self):
+        return {"frame_timeout_s": 0.5}
+
+    def test_a_handshake_that_is_not_finished_ends(self, serving, connect, caplog):
+        half = connect(serving, port=serving.settings.tls.port)
+        half.send(b"\x16\x03\x01\x02\x00\x01")
+        assert half.is_closed()
+        serving.wait(lambda: serving.server.statistics.troubles[Trouble.NO_HANDSHAKE] == 1)
+        assert [line for line in caplog.messages if "its TLS handshake failed" in line and "longer than 0.5" in line]
+        assert not serving.server._manager._handshakes
+
+
+class TestReserve:
+    @pytest.fixture
+    def settings(self):
+        return {"max_connections": 1}
+
+    def test_it_is_for_a_certificate_that_may_write(self, serving, connect, dial, authority):
+        """Until the certificate is known, an address that may write is enough."""
+        connect(serving).claim()
+        assert is_parted_from(dial(*authority.issue("scada", "reader")))
+        assert serving.server.statistics.troubles[Trouble.TOO_MANY] == 1
+        assert dial(*authority.issue("line-plc", "writer")).read(REFERENCE, 1) == b"\x12\x34"
 
 
 class TestBadFiles:
