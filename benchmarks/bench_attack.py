@@ -52,17 +52,23 @@ def go_apart() -> None:
     os.execve(unshare, command, {**os.environ, APART: "1"})
 
 
-@contextlib.contextmanager
-def over_tls(folder: Path, configuration: Path) -> Iterator[tuple[str, psutil.Process]]:
-    """Serve the same pages by one more process over TLS."""
-    key, certificate, port = folder / "key.pem", folder / "certificate.pem", free_port()
+def certified(folder: Path) -> tuple[str, str]:
+    """Make a certificate, signed by itself, and its key."""
+    certificate, key = str(folder / "certificate.pem"), str(folder / "key.pem")
     made = f"openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=station -keyout {key} -out {certificate}"
     subprocess.run(made.split(), check=True, capture_output=True)
+    return certificate, key
+
+
+@contextlib.contextmanager
+def over_tls(folder: Path, configuration: Path, certificate: str, key: str) -> Iterator[tuple[str, psutil.Process]]:
+    """Serve the same pages by one more process over TLS."""
+    port = free_port()
     variables = {
         "STATION_HMI_PORT": str(port),
         "STATION_HMI_TLS_ENABLED": "true",
-        "STATION_HMI_TLS_CERTIFICATE": str(certificate),
-        "STATION_HMI_TLS_KEY": str(key),
+        "STATION_HMI_TLS_CERTIFICATE": certificate,
+        "STATION_HMI_TLS_KEY": key,
     }
     command = [sys.executable, "-m", "station", "hmi", "--config", str(configuration)]
     log = folder / "tls.log"
@@ -96,7 +102,14 @@ def station(seconds: float) -> Iterator[tuple[Target, str]]:
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         names = [HOST, "127.0.0.1", "localhost"]
-        served = {"host": ANYWHERE, "readers": ["127.0.0.0/8", NETWORK], "writers": ["127.0.0.0/8", NETWORK]}
+        certificate, key = certified(folder)
+        files = {"certificate": certificate, "key": key, "client_authority": certificate}
+        served = {
+            "host": ANYWHERE,
+            "readers": ["127.0.0.0/8", NETWORK],
+            "writers": ["127.0.0.0/8", NETWORK],
+            "tls": {"enabled": True, "port": free_port(), **files},
+        }
         running = stack.enter_context(
             demo(1, modbus=served, metrics={"host": ANYWHERE}, hmi={"host": ANYWHERE, "names": names})
         )
@@ -107,12 +120,20 @@ def station(seconds: float) -> Iterator[tuple[Target, str]]:
         add_people(f"http://127.0.0.1:{site.hmi.port}")
         command = [sys.executable, "-m", "station", "api-token", "add", "attack", "--role", "operator"]
         made = subprocess.run([*command, "--config", str(configuration)], capture_output=True, text=True, check=True)
-        tls, tls_process = stack.enter_context(over_tls(folder, configuration))
+        tls, tls_process = stack.enter_context(over_tls(folder, configuration, certificate, key))
         processes = {name: running.part(name) for name in ("plc run", "hmi", "service")}
         processes = {name.partition(" ")[0]: each for name, each in processes.items()} | {"tls": tls_process}
         url = f"http://{HOST}:{site.hmi.port}"
         target = Target(
-            site.modbus.port, site.metrics.port, url, tls, home, made.stdout.split()[-1], processes, seconds
+            modbus=site.modbus.port,
+            modbus_tls=site.modbus.tls.port,
+            metrics=site.metrics.port,
+            pages=url,
+            tls=tls,
+            home=home,
+            token=made.stdout.split()[-1],
+            processes=processes,
+            seconds=seconds,
         )
         yield target, panel_endpoint(site.hmi, home)
 

@@ -68,6 +68,11 @@ def silent_many(target: Target) -> Found:
     return silent(target.modbus, SILENT, STRANGERS, target.seconds)
 
 
+def silent_tls(target: Target) -> Found:
+    """One machine that connects to the TLS port and begins no handshake."""
+    return silent(target.modbus_tls, SILENT, (STRANGER,), target.seconds)
+
+
 def flood(target: Target) -> Found:
     """Connections as fast as they can be made."""
     tries = refused = 0
@@ -225,6 +230,7 @@ def oracle(target: Target) -> Found:
 ATTACKS = (
     Attack("plc", "250 silent connections from one address", silent_one),
     Attack("plc", "250 silent connections from 250 addresses", silent_many),
+    Attack("plc", "250 connections to the TLS port without a handshake", silent_tls),
     Attack("plc", "connect flood", flood),
     Attack("plc", "half headers", half_headers),
     Attack("plc", "drip, a byte each 0.6 s", drip),

@@ -21,6 +21,7 @@ class Target(NamedTuple):
     """What an attacker reaches, and where the results are read."""
 
     modbus: int
+    modbus_tls: int
     metrics: int
     pages: str
     tls: str
