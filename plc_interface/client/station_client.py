@@ -11,6 +11,7 @@ from plc_interface.client.errors import (
     CommandFailedError,
     DeadlineMissedError,
     NotReadyError,
+    RequestRefusedError,
     TriggerRefusedError,
 )
 from plc_interface.client.inspection_result import InspectionResult, published_result
@@ -23,6 +24,8 @@ from station.channel.line import CommandName
 POLL_S = 0.01
 ANSWER_DEADLINE_S = 3.0
 HEARTBEAT_S = 0.2
+_NOT_WRITER = 6
+"""The Modbus exception for a write without the right to."""
 
 CONTROL, STATUS = BY_NAME["control"], BY_NAME["status"]
 
@@ -38,14 +41,13 @@ class StationClient(RegisterLink):
 
     async def close(self) -> None:
         """Stop the heartbeat and close the connection. Idempotent; the station disarms, results are kept."""
-        if self._beating is not None:
-            self._beating.cancel()
-            await asyncio.gather(self._beating, return_exceptions=True)
-            self._beating = None
+        await self._end_beating()
         await super().close()
 
     async def arm(self) -> None:
         """Claim the right to write, set enable anew, and start the heartbeat. Idempotent.
+
+        The heartbeat ends with the first write of it that fails; `inspect` reports that, and `arm` starts it anew.
 
         Raises:
             RequestRefusedError: another client holds the right to write.
@@ -53,13 +55,19 @@ class StationClient(RegisterLink):
         await self.write({"write_key": WRITE_KEY})
         await self._set(frozenset())
         await self._set(frozenset({"enable"}))
-        if self._beating is None:
+        if self._beating is None or self._beating.done():
+            await self._end_beating()
             self._beating = asyncio.create_task(self._beat(), name="PLC's heartbeat")
 
     async def disarm(self) -> None:
-        """Clear enable and release the right to write. Idempotent."""
-        await self._set(frozenset())
-        await self.write({"write_key": 0})
+        """Stop the heartbeat, clear enable and release the right to write. Idempotent."""
+        await self._end_beating()
+        try:
+            await self._set(frozenset())
+            await self.write({"write_key": 0})
+        except RequestRefusedError as error:
+            if error.code != _NOT_WRITER:  # who is not the writer is not armed either
+                raise
 
     async def scan(self) -> dict[str, Any]:
         """Read status, result block and alarms with one request, by register names."""
@@ -213,8 +221,12 @@ class StationClient(RegisterLink):
             raise NotReadyError(
                 f"result {now['result_sequence']} of trigger {now['result_trigger_id']} waits: acknowledge it first"
             )
-        if "enable" not in self._control:
+        if self._beating is None:
             raise NotReadyError("this client is not armed: call arm() first")
+        if self._beating.done():
+            raise NotReadyError(
+                f"the heartbeat has ended ({self._beating.exception()}), and the station disarms: call arm() again"
+            )
         if "trigger_acknowledged" in bits:
             raise NotReadyError("the answer to the trigger before still stands: wait until it has fallen")
 
@@ -240,6 +252,13 @@ class StationClient(RegisterLink):
                 raise DeadlineMissedError(f"{what} did not come in time; the status bits are: {bits}")
             await asyncio.sleep(POLL_S)
         return now
+
+    async def _end_beating(self) -> None:
+        """Stop the heartbeat, if there is one, and forget why it may have ended by itself."""
+        if self._beating is not None:
+            self._beating.cancel()
+            await asyncio.gather(self._beating, return_exceptions=True)
+            self._beating = None
 
     async def _beat(self) -> None:
         for beat in itertools.cycle(range(1, 2**16)):

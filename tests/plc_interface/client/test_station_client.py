@@ -173,6 +173,54 @@ def test_its_heartbeat_keeps_it_armed_and_its_end_disarms(serve):
     assert asyncio.run(main()) == (True, False, "disarmed")
 
 
+async def beats_on(client):
+    """Wait for the next heartbeat that the station has noted."""
+    noted = await client.read("plc_heartbeat_echo")
+    async with asyncio.timeout(20):
+        while await client.read("plc_heartbeat_echo") == noted:
+            await asyncio.sleep(0.01)
+
+
+async def inspect_until_it_is_not_ready(client):
+    async with asyncio.timeout(20):
+        while True:
+            with contextlib.suppress(RequestRefusedError):
+                await client.inspect(7)
+
+
+def test_armed_again_it_beats_again(serve):
+    async def main():
+        async with serve() as rig, StationClient(HOST, rig.port) as client:
+            await client.arm()
+            await beats_on(client)
+            await client.disarm()
+            await client.disarm()
+            with pytest.raises(NotReadyError, match=r"not armed: call arm\(\) first"):
+                await client.inspect(7)
+            await client.arm()
+            await client.arm()
+            await beats_on(client)
+            return await client.inspect(7)
+
+    assert asyncio.run(main()).trigger_id == 7
+
+
+def test_a_heartbeat_that_ended_is_reported_and_armed_again_it_beats_again(serve):
+    async def main():
+        async with serve() as rig, StationClient(HOST, rig.port) as client:
+            await client.arm()
+            await beats_on(client)
+            await client.write({"write_key": 0})  # the next beat is refused, as it is beside another writer
+            with pytest.raises(NotReadyError, match=r"heartbeat has ended \(.* exception 06: .*call arm\(\) again"):
+                await inspect_until_it_is_not_ready(client)
+            assert rig.begun == []
+            await client.arm()
+            await beats_on(client)
+            return await client.inspect(7)
+
+    assert asyncio.run(main()).trigger_id == 7
+
+
 def test_a_second_client_may_read_but_not_write(serve):
     async def main():
         async with (
