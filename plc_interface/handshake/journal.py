@@ -39,7 +39,7 @@ class Journal(_Persistent):
     epoch: int = Field(default=0, ge=0, lt=2**32)
     """Resets of the counters, a start of the interface among them."""
     highest: int = Field(default=0, ge=0, lt=2**32)
-    """The highest sequence that the station gave for an accepted trigger."""
+    """The highest sequence of an accepted trigger, or of one of `hidden`: the next one is higher."""
     acknowledged: int = Field(default=0, ge=0, lt=2**32)
     """The PLC has taken everything up to here."""
     disbelieved: int = Field(default=0, ge=0, lt=2**32)

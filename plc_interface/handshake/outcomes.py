@@ -72,12 +72,17 @@ def publish_own(work: Work, outcome: Outcome) -> None:
 
 
 def hide(work: Work, outcome: Outcome) -> None:
-    """Close an inspection whose trigger was refused: NO_RESULT for the station, nothing for the PLC."""
+    """Close an inspection whose trigger was refused: NO_RESULT for the station, nothing for the PLC.
+
+    Its sequence is used up: in answer to a later trigger it is refused, not taken for that trigger's fruit.
+    """
     journal = work.state.journal
     work.log(f"inspection {outcome.sequence} belongs to a trigger that was refused: it is called off")
     work.durable = True
     work.update_journal(
-        verdicts=(*journal.verdicts, outcome)[-MOST_UNNOTED:], hidden=(*journal.hidden, outcome.sequence)
+        verdicts=(*journal.verdicts, outcome)[-MOST_UNNOTED:],
+        hidden=(*journal.hidden, outcome.sequence),
+        highest=max(journal.highest, outcome.sequence),
     )
     work.actions.append(NotifyPublished(outcome))
 

@@ -1,9 +1,9 @@
-"""Triggers and outcomes in progress: the callers that wait for each, and those answered already."""
+"""Triggers and outcomes in progress, with the callers that wait for each."""
 
 import asyncio
 from collections import OrderedDict
 
-from station.channel.line import Begin, BeginReply, Outcome
+from station.channel.line import BeginReply, Outcome
 from station.messages import records as messages
 from station.records.errors import UnknownInspectionError
 from station.runtime.cycle.inspection import Inspection
@@ -17,22 +17,10 @@ class RecentTriggers:
     def __init__(self) -> None:
         self._outcomes: OrderedDict[int, asyncio.Future[Outcome]] = OrderedDict()
         self._inspections: dict[int, Inspection] = {}
-        self._last: tuple[Begin, int] | None = None
-        """The last accepted trigger, until its outcome was published."""
 
-    def repeated(self, request: Begin) -> Inspection | None:
-        """Return the inspection that this trigger has begun already: a retried request begins none.
-
-        The PLC never gives an id twice in a row; an id that repeats before its outcome was published is the same fruit.
-        """
-        if self._last is None or self._last[0] != request:
-            return None
-        return self._inspections.get(self._last[1])
-
-    def accepted(self, request: Begin, now: Inspection) -> None:
+    def accepted(self, now: Inspection) -> None:
         """Add a durable trigger whose inspection, with its sequence, has begun; earlier ones release their pictures."""
         assert now.sequence is not None  # noqa: S101 (it is durable)
-        self._last = (request, now.sequence)
         for earlier in self._inspections.values():
             earlier.forget_pictures()
         self._inspections[now.sequence] = now
@@ -46,12 +34,6 @@ class RecentTriggers:
         waiting = self._outcomes.get(outcome.sequence)
         if waiting is not None and not waiting.done():
             waiting.set_result(outcome)
-
-    def published(self, outcome: Outcome) -> None:
-        """Note that an outcome was published; from now on the same trigger id is another fruit's."""
-        if self._last is not None and self._last[1] == outcome.sequence:
-            self._last = None
-        self.ended(outcome)
 
     def inspection(self, sequence: int) -> Inspection | None:
         """Return one of the last inspections."""
@@ -72,8 +54,8 @@ class RecentTriggers:
 class PendingTrigger:
     """One trigger between its request and its answer."""
 
-    def __init__(self, request: Begin, inspection: Inspection) -> None:
-        self.request, self.inspection = request, inspection
+    def __init__(self, inspection: Inspection) -> None:
+        self.inspection = inspection
         self.recording: asyncio.Future[None] | None = None
         """Task that makes it durable and numbers it; when it is cancelled, the record is withdrawn."""
         self._answer: asyncio.Future[BeginReply] = asyncio.get_running_loop().create_future()

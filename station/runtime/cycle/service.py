@@ -172,11 +172,10 @@ class Service:
     async def begin(self, request: Begin, refusal: Refusal | None, lot: str) -> BeginReply:
         """Begin an inspection of a lot's fruit, or refuse it with the refusal given.
 
-        The same request again, before its outcome was published, begins none.
+        The PLC interface sends each trigger once, so an equal request is another fruit's: the PLC may use the id of a
+        refused trigger again, and its interface may not have received the answer to that one.
         """
         async with self._beginning:
-            if (same := self.triggers.repeated(request)) is not None:
-                return self._accepted(same)
             if refusal is not None or self.active is None:
                 return self._refused(refusal or Refusal.NOT_READY)
             trigger = Trigger(
@@ -200,14 +199,14 @@ class Service:
                 scale.scale_uncertainty,
                 self._resolution_mm,
             )
-            self._pending = PendingTrigger(request, now)
+            self._pending = PendingTrigger(now)
             self.runner.post(Event.TRIGGER)
             return await self._pending.answered()
 
     async def published(self, outcome: Outcome) -> None:
         """Store that the PLC was given a final outcome, and count it, once; cancel a fruit still under inspection."""
         first = await self.registry.records.published(outcome)
-        self.triggers.published(outcome)
+        self.triggers.ended(outcome)
         if first:
             now = self.triggers.inspection(outcome.sequence)
             fruit = "" if now is None else now.active.recipe.name
@@ -350,17 +349,11 @@ class Service:
     def _take_on(self, pending: PendingTrigger) -> None:
         now = pending.inspection
         now.accepted_s = time.monotonic()
-        self.triggers.accepted(pending.request, now)
+        self.triggers.accepted(now)
         self.registry.accepted(now)
-        pending.answer(self._accepted(now))
+        pending.answer(BeginReply(sequence=now.sequence, deadline_s=now.limits.inspection_s + RECORD_NO_RESULT_S))
 
     # Small parts.
-
-    def _accepted(self, now: Inspection) -> BeginReply:
-        left_s = now.limits.inspection_s + RECORD_NO_RESULT_S
-        if now.accepted_s is not None:
-            left_s -= time.monotonic() - now.accepted_s
-        return BeginReply(sequence=now.sequence, deadline_s=max(0.0, left_s))
 
     def _refused(self, refusal: Refusal) -> BeginReply:
         self._metrics.refused(refusal)

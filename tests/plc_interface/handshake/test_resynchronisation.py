@@ -87,3 +87,27 @@ def test_an_inspection_that_ran_at_the_end_waits_for_the_station_as_long_as_it_m
     made.feed(ev.Tick)
     (outcome,) = made.state.queue
     assert (outcome.sequence, outcome.outcome) == (41, "NO_RESULT")
+
+
+def test_an_inspection_that_was_called_off_is_never_the_next_fruits(bench):
+    """Its trigger's answer was lost with the interface, and the PLC uses the refused id again."""
+    made = bench(Journal(asked_id=7, highest=40, acknowledged=40, accepted_id=6))
+    made.feed(ev.WriterGranted)
+    made.link(Open(running=None, outcomes=(made.outcome(),)))
+    assert [note.outcome.outcome for note in made.of(do.NotifyPublished)] == ["NO_RESULT"]
+    made.write()
+    made.write("enable")
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=41, deadline_s=2.0))
+    assert (made.state.last_refusal, made.state.inspection) == (Refusal.NOT_READY, Inspection.NONE)
+    made.feed(ev.OutcomeReceived, made.outcome())
+    assert (made.state.queue, made.of(do.RequestOutcome), made.of(do.ForwardOutcome)) == ((), [], [])
+
+
+def test_what_is_called_off_before_it_hinders_no_adoption_of_the_plcs_own(bench):
+    made = bench(Journal(asked_id=7, highest=40))
+    disowned, accepted = made.outcome(), made.outcome(sequence=42, trigger_id=8)
+    made.link(Open(running=(43, 9), outcomes=(accepted, disowned)))
+    assert made.state.journal.hidden == ()
+    assert [outcome.sequence for outcome in made.state.queue] == [42]
+    assert made.state.running.sequence == 43
