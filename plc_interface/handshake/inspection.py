@@ -27,7 +27,7 @@ def is_new(work: Work) -> bool:
 
 
 def accept(work: Work) -> None:
-    """Accept the id under the sequence, start the deadline, `AwaitOutcome`."""
+    """Accept the id under the sequence, `acquiring`, start the deadline, `AwaitOutcome`."""
     state, event, pending = work.state, work.event, work.state.pending
     if not isinstance(event, BeginAnswered) or event.begun.sequence is None or pending is None:
         return
@@ -44,6 +44,7 @@ def run(work: Work, sequence: int, pending: RequestBegin, deadline_s: float) -> 
     state, station = work.state, work.state.station
     within_s = deadline_s + work.settings.result_margin_s
     state.pending = None
+    state.acquiring = True
     state.running = running(pending, sequence, work.at, within_s, station)
     if state.taken == sequence:
         state.taken = 0  # what runs has no outcome yet: the PLC's number was wrong, or of another station
@@ -98,8 +99,9 @@ def refuse_reused_sequence(work: Work) -> None:
 
 
 def refuse_as_lost(work: Work) -> None:
-    """Refuse as station lost; if the station began it, its result is never published."""
+    """Refuse as station lost, `acquiring`; if the station began it, its result is never published."""
     pending = work.state.pending
+    work.state.acquiring = True
     if pending is not None:
         work.durable = True
         work.update_journal(disowned=(*work.state.journal.disowned, pending.trigger_id)[-8:])

@@ -5,12 +5,16 @@ from plc_interface.handshake.events import Beat
 from plc_interface.handshake.modes import Link, Signal
 from plc_interface.handshake.resynchronisation import resynchronise
 from plc_interface.handshake.work import Work, described, row
+from station.vocabulary import PackmlState
+
+_AT_THE_FRUIT = {PackmlState.STARTING, PackmlState.EXECUTE}
+"""Also where the interface knows of no accepted trigger: the station may have begun one that was refused as lost."""
 
 none_is_pending = described("`Resume` is not pending.", lambda work: work.state.open_request is None)
 
 
 def store_state(work: Work) -> None:
-    """Store the station's state, wait for the next beat."""
+    """Store the station's state, `acquiring` by it, wait for the next beat."""
     if not isinstance(work.event, Beat):
         return
     state, station = work.state, work.event.station
@@ -18,6 +22,10 @@ def store_state(work: Work) -> None:
         state.last_boot = station.boot
         state.station_boots = (state.station_boots + 1) % 2**16
     state.station = station
+    if station.packml_state is PackmlState.IDLE:
+        state.acquiring = state.running is not None  # what the PLC waits for is ended by its outcome first
+    elif station.packml_state in _AT_THE_FRUIT:
+        state.acquiring = True
     work.start(Signal.STATION_SILENT, work.settings.station_lost_after_s)
 
 

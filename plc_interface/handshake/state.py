@@ -105,6 +105,9 @@ class State:
     open_request: int | None = None
     """The number of `RequestOpen` that is not answered."""
 
+    acquiring: bool = True
+    """The station may be at the fruit in the nest; after a start this is unknown until a beat reports IDLE."""
+
     # the line
     diverts: bool = True
     """Whether the line's output can divert a fruit; if not, no inspection is started."""

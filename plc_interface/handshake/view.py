@@ -72,13 +72,12 @@ def _status(state: State) -> dict[str, Value]:
 
 def _status_bits(state: State) -> list[str]:
     station = state.station
-    running = state.inspection is Inspection.RUNNING
     bits = {
         "online": state.link is Link.UP and state.service is Service.IN_SERVICE,
         "trigger_ready": obstacle(state) is None and station is not None and station.ready,
         "trigger_acknowledged": state.trigger in {Trigger.ANSWERED, Trigger.HELD},
-        "acquiring": running,
-        "inspecting": running,
+        "acquiring": state.acquiring,
+        "inspecting": state.inspection is Inspection.RUNNING,
         "result_valid": state.result is Result.PUBLISHED,
         "overrun": state.overrun,
         "missed": state.missed,

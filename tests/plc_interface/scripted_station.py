@@ -52,6 +52,7 @@ class ScriptedStation:
         self.lines: list[Line] = []
         self.commands: list[Command] = []
         self.healthy = True
+        self.packml_state = PackmlState.EXECUTE
         self.refusal: Refusal | None = None
         self.deadline_s = 60.0
         self.command_gate = asyncio.Event()
@@ -163,7 +164,7 @@ class ScriptedStation:
             healthy=self.healthy,
             ready=self.running is None,
             why_not_ready=None,
-            packml_state=PackmlState.EXECUTE,
+            packml_state=self.packml_state,
             mode=1,
             recipe_number=3,
             recipe_checksum=0x12345678,

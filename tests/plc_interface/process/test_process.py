@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from plc_interface.handshake.view import STATION_LOST_CODE, lot_checksum
-from station.channel.line import CommandDone, Reason, Refusal
+from station.channel.line import CommandDone, PackmlState, Reason, Refusal
 from station.messages import can, line
 from station.messages.message import verbatim
 
@@ -282,6 +282,33 @@ def test_a_station_that_dies_while_it_inspects(cell, eventually, limit_s):
             await eventually(lambda: len(station.lines) > beats + 5)
             first = (await plc.wait("error"))["station_heartbeat"]
             assert (first - still["station_heartbeat"]) % 2**16 <= 2
+
+    asyncio.run(scenario())
+
+
+def test_a_fruit_stays_until_the_station_has_let_it_go(cell, limit_s):
+    async def scenario():
+        async with cell(handshake_station_lost_after_s=limit_s) as made:
+            station, plc = made.station, await made.plc()
+            station.packml_state = PackmlState.IDLE
+            await plc.arm("buffer_results")
+            await plc.wait(without="acquiring")
+            station.packml_state = PackmlState.EXECUTE
+            await plc.trigger(1)
+            station.finish("PASS")
+            await plc.wait("result_valid", "acquiring", without="inspecting")
+            station.packml_state = PackmlState.COMPLETING
+            await plc.wait("trigger_ready", "acquiring", packml_state="completing")
+            station.packml_state = PackmlState.IDLE
+            await plc.wait("trigger_ready", without="acquiring")
+            station.packml_state = PackmlState.EXECUTE
+            await plc.trigger(2)
+            await station.die()
+            await plc.wait("acquiring", "error", without="online")
+            await station.start()
+            await plc.wait("acquiring", "online", station_boots=2)
+            station.packml_state = PackmlState.IDLE
+            await plc.wait("online", without="acquiring")
 
     asyncio.run(scenario())
 

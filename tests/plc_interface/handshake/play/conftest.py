@@ -64,6 +64,8 @@ class Station:
 
     records: dict[int, Inspection] = field(default_factory=dict)
     running: int | None = None
+    jaws_closed: bool = False
+    """On a fruit, until a while after its outcome; also over a kill."""
     waiting: set[int] = field(default_factory=set)
     boots: int = 1
     up: bool = True
@@ -77,13 +79,19 @@ class Station:
         self.boots += 1
         self.up = True
 
+    @property
+    def packml_state(self) -> PackmlState:
+        if self.running is not None:
+            return PackmlState.EXECUTE
+        return PackmlState.COMPLETING if self.jaws_closed else PackmlState.IDLE
+
     def state(self) -> StationState:
         return StationState(
             boot=f"boot {self.boots}",
             healthy=True,
             ready=self.running is None,
             why_not_ready=None,
-            packml_state=PackmlState.EXECUTE,
+            packml_state=self.packml_state,
             mode=1,
             recipe_number=RECIPE,
             recipe_checksum=77,
@@ -98,6 +106,7 @@ class Station:
         sequence = max(self.records, default=100) + 1
         self.records[sequence] = Inspection(trigger_id)
         self.running = sequence
+        self.jaws_closed = True
         return BeginReply(sequence=sequence, deadline_s=DEADLINE_S)
 
     def judge(self, name: str) -> None:
@@ -151,6 +160,7 @@ class Laws:
         self._enable(event, before, after, actions)
         self._bits_fall_in_time(event, before, after, actions)
         self._acknowledgement(event, before, after, due=due)
+        self._acquiring(event, before, after)
         self._counters(before, after)
 
     def _link(self, event: ev.Event, before: State, after: State, actions: Any, *, silent: bool) -> None:
@@ -270,6 +280,18 @@ class Laws:
             shown = before.queue[0].sequence if before.queue else 0
             if sequence not in {shown, before.unconfirmed}:
                 assert Fault.WRONG_ACKNOWLEDGEMENT in after.faults
+
+    @staticmethod
+    def _acquiring(event: ev.Event, before: State, after: State) -> None:
+        word = view(after)["status"]
+        assert isinstance(word, int)
+        now = word & BY_NAME["status"].bit("acquiring")
+        reports = event.station.packml_state if isinstance(event, ev.Beat) else None
+        lost = before.pending is not None and after.pending is None and after.last_refusal is Refusal.STATION_LOST
+        if after.running is not None or reports is PackmlState.EXECUTE or lost:
+            assert now, "the fruit may be moved while the station may be at it"
+        elif reports is not PackmlState.IDLE:
+            assert now or not before.acquiring, "the fruit may be moved, and no beat has said so"
 
     def _counters(self, before: State, after: State) -> None:
         counters = after.counters

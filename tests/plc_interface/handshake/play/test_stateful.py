@@ -484,6 +484,10 @@ class Handshake(RuleBasedStateMachine):
             self.station.judge(name)
             self.tell_outcomes()
 
+    @rule()
+    def jaws_open(self) -> None:
+        self.station.jaws_closed = self.station.running is not None
+
     @rule(passed_s=st.sampled_from([0.01, 0.1, 0.45, 0.9, 1.1, 4.4, 5.5]), beats=st.booleans())
     def time_passes(self, passed_s: float, beats: bool) -> None:
         end_s = self.now_s + passed_s
@@ -603,6 +607,9 @@ class Handshake(RuleBasedStateMachine):
             assert record.stands is not None
             assert block["result_outcome"] == BY_NAME["result_outcome"].code(record.stands.outcome)
         assert all(record.acknowledged for record in self.station.records.values())
+        self.jaws_open()
+        self.beat()
+        assert not self.bit("acquiring")
         self.whole_cycle()
         assert self.seen["accepted_trigger_id"] == self.next_id - 1, f"the interface is blocked: {self.state}"
 
