@@ -65,13 +65,18 @@ LOT_ROWS = (
 )
 
 
-def _service(mode: Service) -> tuple[Row, ...]:
+def _service(mode: Service, off: Service, on: Service) -> tuple[Row, ...]:
     return (
-        row(mode, Signal.OFFLINE_ON, to=Service.OFFLINE),
-        row(mode, Signal.OFFLINE_OFF, to=Service.IN_SERVICE),
+        row(mode, Signal.OFFLINE_ON, to=off),
+        row(mode, Signal.OFFLINE_OFF, to=on),
         row(mode, Signal.CLEAR_ON, clear),
         row(mode, Signal.RESET_ON, reset),
+        row(mode, Signal.SHUTTING_DOWN, to=Service.ENDING),
     )
 
 
-SERVICE_ROWS = (*_service(Service.IN_SERVICE), *_service(Service.OFFLINE))
+SERVICE_ROWS = (
+    *_service(Service.IN_SERVICE, Service.OFFLINE, Service.IN_SERVICE),
+    *_service(Service.OFFLINE, Service.OFFLINE, Service.IN_SERVICE),
+    *_service(Service.ENDING, Service.ENDING, Service.ENDING),
+)

@@ -107,7 +107,7 @@ class OutcomeFailed(Event):
 
 
 class ShuttingDown(Event):
-    """This process ends: it reports offline to the PLC, and begins nothing any more."""
+    """This process ends: it reports offline to the PLC, and begins no inspection any more."""
 
 
 @dataclass(frozen=True, slots=True)

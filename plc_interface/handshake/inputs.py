@@ -216,5 +216,5 @@ _HANDLERS: dict[type, Callable[[Work, Any], None]] = {
     OutcomeNoted: _outcome_noted,
     CommandAnswered: _command_answered,
     CommandFailed: _command_answered,
-    ShuttingDown: lambda work, _event: work.signals.append(Signal.OFFLINE_ON),
+    ShuttingDown: lambda work, _event: work.signals.append(Signal.SHUTTING_DOWN),
 }

@@ -24,10 +24,12 @@ class Arming(StrEnum):
 
 
 class Service(StrEnum):
-    """The offline bit."""
+    """The offline bit, and the end of this process."""
 
     IN_SERVICE = "in service"
     OFFLINE = "offline"
+    ENDING = "ending"
+    """As OFFLINE, whatever the PLC writes."""
 
 
 class Trigger(StrEnum):
@@ -129,6 +131,8 @@ class Signal(StrEnum):
     COMMAND_DONE = "command done"
     COMMAND_REFUSED = "command refused"
     COMMAND_FAILED = "command failed"
+    # from this process
+    SHUTTING_DOWN = "interface ends"
     # from one region to another
     BEGIN = "begin"
     ACCEPTED = "accepted"

@@ -10,7 +10,7 @@ def obstacle(state: State) -> Refusal | None:
     """Return why no trigger is accepted now, whatever its id; None if the station would be asked."""
     waiting = len(state.queue)
     reasons: tuple[tuple[bool, Refusal], ...] = (
-        (state.service is Service.OFFLINE, Refusal.OFFLINE),
+        (state.service is not Service.IN_SERVICE, Refusal.OFFLINE),
         (state.link is not Link.UP, Refusal.STATION_LOST),
         (state.arming is not Arming.ARMED, Refusal.NOT_ENABLED),
         (not state.diverts, Refusal.NOT_READY),

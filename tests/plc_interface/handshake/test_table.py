@@ -522,3 +522,20 @@ def test_an_inspection_that_ran_before_a_restart_began_as_long_ago_as_it_did(ben
     again = restarted(made.state.journal, ev.Moment(5.0, made.at().utc_ms + 3000), 2.0)
     assert again.running is not None
     assert again.running.began_s == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("new_writer", [True, False])
+def test_an_interface_that_ends_begins_nothing_whatever_the_plc_writes(bench, new_writer):
+    made = bench()
+    made.armed()
+    made.feed(ev.ShuttingDown)
+    if new_writer:
+        made.feed(ev.WriterWithdrawn)
+        made.feed(ev.WriterGranted)
+    for bits in (("enable", "trigger"), ("offline",), (), ("enable",), ("enable", "trigger")):
+        made.write(*bits, trigger_id=7)
+        assert not {"online", "trigger_ready"} & status(made)
+    assert made.of(do.RequestBegin) == []
+    assert made.state.last_refusal is Refusal.OFFLINE
+    made.feed(ev.ShuttingDown)
+    assert made.state.unlisted == 0
