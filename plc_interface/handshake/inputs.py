@@ -43,12 +43,12 @@ def apply_event(work: Work) -> None:
 
 def _writer_granted(work: Work, _event: WriterGranted) -> None:
     work.state.writer = True
-    work.state.seen = None
+    work.state.seen = work.state.last_heartbeat = None
 
 
 def _writer_withdrawn(work: Work, _event: WriterWithdrawn) -> None:
     work.state.writer = False
-    work.state.seen = None
+    work.state.seen = work.state.last_heartbeat = None
     work.state.size = NO_SIZE
     work.stop(Signal.PLC_SILENT)
     work.signals.append(Signal.WRITER_LOST)
@@ -97,8 +97,7 @@ def _outcome_noted(work: Work, event: OutcomeNoted) -> None:
 def _plc_wrote(work: Work, event: PlcWrote) -> None:
     state, before, seen = work.state, work.state.inputs, work.state.seen
     state.inputs = event.inputs
-    if event.inputs.plc_heartbeat != before.plc_heartbeat:
-        work.start(Signal.PLC_SILENT, work.settings.plc_heartbeat_timeout_s)
+    _watch_heartbeat(work, event)
     rose: frozenset[str] = frozenset()
     fell: frozenset[str] = frozenset()
     if "control" in event.written:
@@ -128,6 +127,15 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
     ):
         if bit in rose or bit in fell:
             work.signals.append(on if bit in rose else off)
+
+
+def _watch_heartbeat(work: Work, event: PlcWrote) -> None:
+    """Monitor a heartbeat once this writer has changed it."""
+    if "plc_heartbeat" not in event.written:
+        return
+    if work.state.last_heartbeat not in {None, event.inputs.plc_heartbeat}:
+        work.start(Signal.PLC_SILENT, work.settings.plc_heartbeat_timeout_s)
+    work.state.last_heartbeat = event.inputs.plc_heartbeat
 
 
 _BITS = frozenset({*(bit for bit, _, off in EDGES if off), "acknowledge", "execute_command", "trigger"})

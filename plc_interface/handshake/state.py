@@ -81,6 +81,8 @@ class State:
     inputs: Inputs = field(default_factory=Inputs)
     seen: frozenset[str] | None = None
     """The control bits at the writer's last write; None before its first one, when every bit is news."""
+    last_heartbeat: int | None = None
+    """As this writer has written it; None before its first, as another's is no change by this one."""
     taken: int = 0
     """The sequence in the first write after a start: the PLC had taken it, though the journal may not have it."""
     unconfirmed: int = 0

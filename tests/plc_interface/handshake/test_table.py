@@ -1,6 +1,7 @@
 """The table by itself: corners that are hard to reach from outside, and what is made from it."""
 
 import zlib
+from dataclasses import replace
 
 import pytest
 
@@ -349,7 +350,8 @@ def test_an_enable_left_high_over_a_loss_never_arms_again(bench, lost):
         made.feed(ev.WriterWithdrawn)
         made.feed(ev.WriterGranted)
     elif lost == "heartbeat":
-        made.write("enable", plc_heartbeat=1)
+        for count in (1, 2):
+            made.write("enable", plc_heartbeat=count)
         made.now_s += made.settings.plc_heartbeat_timeout_s
         made.feed(ev.Tick)
     else:
@@ -539,3 +541,26 @@ def test_an_interface_that_ends_begins_nothing_whatever_the_plc_writes(bench, ne
     assert made.state.last_refusal is Refusal.OFFLINE
     made.feed(ev.ShuttingDown)
     assert made.state.unlisted == 0
+
+
+@pytest.mark.parametrize("with_control", [True, False])
+def test_a_writer_that_never_changes_its_heartbeat_is_not_monitored_whatever_the_one_before_left(bench, with_control):
+    made = bench()
+    made.armed()
+    for count in (344, 345):
+        made.write("enable", plc_heartbeat=count)
+    assert made.state.watched
+    made.feed(ev.WriterWithdrawn)
+    made.feed(ev.WriterGranted)
+    heartbeat = {"plc_heartbeat": 0}
+    for bits in ((), ("enable",), ("enable",)):
+        made.write(*bits, **(heartbeat if with_control else {}))
+        if not with_control:
+            made.inputs = replace(made.inputs, **heartbeat)
+            made.feed(ev.PlcWrote, made.inputs, frozenset(heartbeat))
+    assert not made.state.watched
+    made.now_s += made.settings.plc_heartbeat_timeout_s
+    made.feed(ev.Tick)
+    assert made.state.arming is Arming.ARMED
+    made.write("enable", plc_heartbeat=1)
+    assert made.state.watched

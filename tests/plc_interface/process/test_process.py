@@ -214,6 +214,7 @@ def test_a_plc_that_stands_still_or_goes_is_disarmed_and_its_results_are_kept(ce
             await plc.arm("buffer_results")
             await plc.trigger(1)
             await plc.write(plc_heartbeat=1)
+            await plc.write(plc_heartbeat=2)
             await eventually(lambda: station.lines[-1].plc_alive)
             await eventually(lambda: not station.lines[-1].plc_alive and not station.lines[-1].enabled)
             station.finish("FAIL", Reason.AREA_OVER_LIMIT)

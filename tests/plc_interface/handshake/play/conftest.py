@@ -147,6 +147,7 @@ class Laws:
         self.boot, self.boots = "", 0
         self.heard_s: float | None = None
         self.plc_beat_s: float | None = None
+        self.plc_beat: int | None = None
         self.since_s: dict[str, float] = {}
 
     def hold(self, event: ev.Event, before: State, after: State, actions: Sequence[do.Action]) -> None:
@@ -231,13 +232,15 @@ class Laws:
             assert Fault.PLC_SILENT in after.faults or self._cleared(actions)
             assert after.arming is not Arming.ARMED or isinstance(event, ev.PlcWrote)
         if isinstance(event, ev.WriterWithdrawn):
-            self.plc_beat_s = None
+            self.plc_beat_s = self.plc_beat = None
             assert after.arming is not Arming.ARMED
             assert after.counters["count_communication"] > before.counters["count_communication"]
             assert before.arming is not Arming.ARMED or quiet or Fault.WRITER_LOST in after.faults
         elif isinstance(event, ev.PlcWrote):
-            if event.inputs.plc_heartbeat != before.inputs.plc_heartbeat:
-                self.plc_beat_s = event.at.s
+            if "plc_heartbeat" in event.written:
+                if self.plc_beat not in {None, event.inputs.plc_heartbeat}:
+                    self.plc_beat_s = event.at.s
+                self.plc_beat = event.inputs.plc_heartbeat
             assert (before.arming, after.arming) != (Arming.DISARMED, Arming.ARMED), "armed without enable anew"
             if "control" in event.written and "enable" not in event.inputs.control:
                 assert after.arming is Arming.RELEASED
