@@ -41,6 +41,10 @@ define("nav.maintenance", "Maintenance")
 define("nav.people", "People")
 
 define("common.older", "Older")
+define(
+    "common.panel_saves_nothing",
+    "This screen saves and prints no files. Open these pages in the browser of a computer for that.",
+)
 define_plural("common.days", "{n} day", "{n} days", "n")
 
 define("problem.title", "This was not possible")

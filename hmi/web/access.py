@@ -29,6 +29,11 @@ def caller_of(request: Request) -> Caller:
     return hmi_of(request).sessions.caller(session)
 
 
+def at_panel(request: Request) -> bool:
+    """Return whether the browser is a panel's: it has no keyboard, and saves and prints nothing."""
+    return PANEL_COOKIE in request.cookies
+
+
 def locale_of(request: Request) -> Locale:
     """Return the language to answer in."""
     cookie, accepted = request.cookies.get(LANGUAGE_COOKIE, ""), request.headers.get("accept-language", "")

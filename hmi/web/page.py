@@ -8,7 +8,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from markupsafe import Markup
 from starlette.responses import Response
 
-from hmi.web.access import PANEL_COOKIE, SESSION_COOKIE, caller_of, hmi_of, locale_of
+from hmi.web.access import SESSION_COOKIE, at_panel, caller_of, hmi_of, locale_of
 from hmi.web.context import Hmi
 from hmi.web.navigation import entries
 from hmi.web.roles import Right, Role
@@ -37,7 +37,7 @@ def show(request: Request, template: str, *, status: int = 200, **values: Any) -
         "path": request.url.path,
         "first_start": hmi.people.first_start,
         "token": lambda: hmi.sessions.token(caller.session),
-        "on_panel": PANEL_COOKIE in request.cookies,
+        "on_panel": at_panel(request),
         "live": lambda name: _live(hmi, locale, caller.role, name),
     }
     answer = HTMLResponse(hmi.renderer.render(template, locale, {**frame, **values}), status)

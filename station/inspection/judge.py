@@ -175,8 +175,8 @@ def _case(press: Press, recipe: Recipe) -> "_Case":
         return last
     if recipe.damage.decided_by == "first_trusted":
         return decided[0]
-    # Every trusted one: the first that is not kept. Once the last is reached, one that a cut or lost edge reaches is not
-    # kept either, and one whose own area may be larger than was seen, and nothing else, leaves it to those before it.
+    # Every trusted one: the first that is not kept. Once the last is reached, one that a cut or lost edge reaches is
+    # not kept either; where the last's area may be larger than was seen, and nothing else, those before it decide.
     not_kept = next((case for case in decided if case.findings), None)
     if not_kept is None and last.reached:
         not_kept = next((case for case in cases if case.may_be_over), None)

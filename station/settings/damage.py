@@ -228,8 +228,8 @@ class DamageThresholds(Settings):
         default="every_limit",
         title="Decided by",
         description="`every_limit` checks each area threshold. `every_trusted` checks each whose area is trusted, and "
-        "needs one; where the last is not, its area may be larger than was seen, but has to be a fruit's in a sound image. "
-        "`first_trusted` takes the first whose area is trusted; later ones are for fruit whose area is not.",
+        "needs one; where the last is not, its area may be larger than was seen, but has to be a fruit's in a sound "
+        "image. `first_trusted` takes the first whose area is trusted; later ones are for fruit whose area is not.",
     )
     growth_mm2_per_mm: float = setting(
         title="Growth threshold",

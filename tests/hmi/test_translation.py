@@ -51,10 +51,16 @@ NO_PAGES = {
     "/recipes/{name}/export",
     "/jobs/{job}/part",
     "/jobs/{job}/file/{name}",
-    "/jobs/{job}/show/{name}",
+    "/jobs/{job}/document/{name}",
 }
 """Parts of pages, pictures, streams and files."""
-IN_THEIR_OWN_TESTS = {"/alarms/{alarm}", "/jobs/{job}", "/maintenance/configuration", "/maintenance/setup"}
+IN_THEIR_OWN_TESTS = {
+    "/alarms/{alarm}",
+    "/jobs/{job}",
+    "/jobs/{job}/show/{name}",
+    "/maintenance/configuration",
+    "/maintenance/setup",
+}
 IN_TEMPLATES = re.compile(r"""\bt\(\s*["']([a-z_]+\.[a-zA-Z_.-]+)["'](?=\s*[,)])""")
 IN_CODE = re.compile(r"""(?:text\(|Problem\(\d+, |UserStoreError\()["']([a-z_]+\.[a-z_]+)["']""")
 

@@ -135,7 +135,35 @@ def test_a_table_and_a_lots_report_are_written_and_fetched(orchard: Any, panel: 
     page.get_by_label("Report of lot").fill("LOT 1")
     follow(page.get_by_role("button", name="Printable report"))
     follow(page.get_by_role("link", name="Open lot.html"))
-    expect(page.get_by_text("Lot LOT 1").first).to_be_visible()
+    with page.expect_popup() as alone:
+        page.get_by_role("link", name="Open alone, to print").click()
+    expect(alone.value.get_by_text("Lot LOT 1").first).to_be_visible()
+
+
+def test_a_panel_shows_a_report_within_a_page_and_offers_no_file(orchard: Any, panel: Any) -> None:
+    """A panel's browser has no keyboard and no way back; it saves and prints nothing."""
+    person = panel("Max")
+    person.go("/panel")
+    page, nothing_saved = person.go("/history"), "This screen saves and prints no files."
+    page.get_by_text("Tables and reports").click()
+    expect(page.get_by_role("button", name="CSV")).to_have_count(0)
+    page.get_by_label("Report of lot").fill("LOT 1")
+    page.locator("[data-keyboard]").get_by_role("button", name="Done").click()
+    follow(page.get_by_role("button", name="Printable report"))
+    follow(page.get_by_role("link", name="Open lot.html"))
+    for width, height in ((390, 844), (1280, 800)):
+        page.set_viewport_size({"width": width, "height": height})
+        expect(page.frame_locator("iframe").get_by_text("Lot LOT 1").first).to_be_visible()
+        expect(page.locator(".alarm-line")).to_be_visible()
+        expect(page.locator("nav.pages").get_by_role("link", name="Run")).to_be_visible()
+        assert page.evaluate(OVERFLOW) == 0
+    assert page.locator("[target], [href*='/file/'], [href*='/document/']").count() == 0
+    follow(page.get_by_role("link", name="Back"))
+    expect(page.get_by_role("link", name="Open lot.html")).to_be_visible()
+    for path in (page.url.removeprefix(person.address), "/maintenance", "/recipes/strawberry/text"):
+        page = person.go(path)
+        expect(page.get_by_text(nothing_saved)).to_be_visible()
+        assert page.locator("[href*='/file/'], [href$='.zip'], [href$='/export']").count() == 0, path
 
 
 def test_the_arrows_lead_to_fruit_that_there_are(orchard: Any, panel: Any) -> None:

@@ -40,6 +40,7 @@ def test_a_button_that_was_pressed_for_the_fruit_before_aborts_none(bench):
                 inspected = asyncio.create_task(cell.line.inspect())
                 await cell.reach(State.CLOSING_TO_ONSET)
                 state = await panel.request(GetPanelState(), PanelState, deadline_s=20)
+                assert state.running_sequence is not None
                 late = await call_off(str(state.running_sequence - 1))
                 meant = await call_off(str(state.running_sequence))
                 return idle, state, late, meant, await inspected
