@@ -58,7 +58,9 @@ def give_session(request: Request, answer: Response, session: str) -> None:
     """Set the browser's cookie if it is new."""
     if session:
         secure = hmi_of(request).settings.tls.enabled
-        answer.set_cookie(SESSION_COOKIE, session, secure=secure, httponly=True, samesite="strict", path="/")
+        # With "strict" a link from another site comes without the cookie, and a new one would log the person out.
+        # No order depends on it: each is a POST from our own page with a token.
+        answer.set_cookie(SESSION_COOKIE, session, secure=secure, httponly=True, samesite="lax", path="/")
 
 
 def go_to(address: str) -> RedirectResponse:

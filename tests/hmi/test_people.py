@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from tests.chromium import follow
+
 
 @pytest.mark.timeout(240)
 def test_who_may_do_what_and_who_is_idle(people, panel, tmp_path, free_hmi):
@@ -32,3 +34,15 @@ def test_who_may_do_what_and_who_is_idle(people, panel, tmp_path, free_hmi):
     hasty.until(".who", "Ana")
     hasty.until(".who", "Log in")
     assert "Ana" not in hasty.text(".who")
+
+
+@pytest.mark.timeout(120)
+def test_a_link_from_another_site_logs_nobody_out(people, operator):
+    elsewhere = operator.context.new_page()
+    link = f"<a href='{people.address}/alarms'>Alarms</a>"
+    elsewhere.route("http://elsewhere.example/", lambda route: route.fulfill(body=link, content_type="text/html"))
+    elsewhere.goto("http://elsewhere.example/")
+    follow(elsewhere.get_by_role("link", name="Alarms"))
+    assert elsewhere.inner_text(".who-name").split("\n") == ["Ana", "Operator"]
+    operator.open("/lot")
+    assert operator.text(".who-name").split("\n") == ["Ana", "Operator"]

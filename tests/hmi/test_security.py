@@ -1,6 +1,7 @@
 """What the pages refuse, asked without a browser: forged, replayed, oversized and cross-site requests, and roles."""
 
 import json
+import re
 import stat
 import time
 
@@ -10,8 +11,9 @@ from hypothesis import strategies as st
 
 from hmi.web.gateway import UNNAMED_BURST, UNNAMED_REFILL_S, Gateway
 from hmi.web.login_limiter import FREE_TRIES, LONGEST_WAIT_S, LoginRateLimiter
+from hmi.web.navigation import modules
 from hmi.web.roles import RIGHTS, Right, Role, least_role
-from hmi.web.security import LARGEST_BODY_BYTES
+from hmi.web.security import LARGEST_BODY_BYTES, SAFE_METHODS
 from hmi.web.sessions import TOKEN_LIFE_S, Sessions
 from hmi.web.user_store import FILE_NAME, UserStore, UserStoreError, pin_problem
 
@@ -90,6 +92,15 @@ class TestRequests:
             status, _, body = pages.post("/language", csrf=forged, language="de")
             assert status == 403, forged
             assert b"was not sent from a page of this browser" in body
+
+    def test_every_route_that_changes_something_asks_for_a_token(self, pages):
+        """Links from other sites come with the cookie. The API's tokens are no cookies; `/here` restarts the idle time."""
+        log_in(pages)
+        routes = [route for module in modules() for route in module.router.routes if route.methods - SAFE_METHODS]
+        asked = [route.path for route in routes if not route.path.startswith("/api/") and route.path != "/here"]
+        assert len(asked) > 30
+        for path in asked:
+            assert pages.post(re.sub(r"{\w+}", "1", path))[0] == 403, path
 
     def test_an_order_that_was_sent_before_is_refused(self, pages):
         token = pages.token()
@@ -206,7 +217,7 @@ class TestLogIn:
         pages.context.people.begin("admin", PIN)
         _, headers, _ = pages.post("/people/log-in", csrf=pages.token(), name="admin", pin=PIN, back="//evil.example")
         assert headers["location"] == "/"
-        assert {"HttpOnly", "SameSite=strict", "Path=/"} <= {part.strip() for part in headers["set-cookie"].split(";")}
+        assert {"HttpOnly", "SameSite=lax", "Path=/"} <= {part.strip() for part in headers["set-cookie"].split(";")}
 
     def test_a_removed_person_is_logged_out_everywhere(self, pages):
         pages.context.people.begin("admin", PIN)
