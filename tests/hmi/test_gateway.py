@@ -27,7 +27,11 @@ class Station(Gateway):
         match request:
             case GetPanelState():
                 last = self._inspections.last_sequence
-                values = {"boot": "1", "last_sequence": last, "fruit_changes": self._inspections.changes}
+                values: dict[str, Any] = {
+                    "boot": "1",
+                    "last_sequence": last,
+                    "fruit_changes": self._inspections.changes,
+                }
                 return PanelState.model_construct(**values)
             case GetRecent():
                 return Recent(fruit=self._inspections.recent(request.most))
@@ -38,15 +42,13 @@ class Station(Gateway):
 
 def test_an_outcome_that_the_plc_was_given_in_place_of_the_stations_is_shown():
     async def scenario():
-        inspections = RecentInspections()
-        inspections.restore(
-            [PASSED], [RestoredFruit(Fruit.model_construct(**{"short": PASSED}), None)], {"A": {"PASS": 1}}
-        )
+        inspections, full = RecentInspections(), dict[str, Any](short=PASSED)
+        inspections.restore([PASSED], [RestoredFruit(Fruit.model_construct(**full), None)], {"A": {"PASS": 1}})
         async with Station(inspections) as gateway:
             await gateway.polled()
             await gateway.polled()
             shown = [gateway.last.short.outcome if gateway.last else None]
-            published = {"sequence": 7, "outcome": "NO_RESULT", "reasons": (Reason.LATE,)}
+            published: dict[str, Any] = {"sequence": 7, "outcome": "NO_RESULT", "reasons": (Reason.LATE,)}
             inspections.set_outcome(Outcome.model_construct(**published))
             await gateway.polled()
             await gateway.polled()
