@@ -71,7 +71,9 @@ def _outcome_received(work: Work, event: OutcomeReceived) -> None:
 
 
 def _request_failed(work: Work, event: RequestFailed) -> None:
-    work.log(f"the station did not answer as it has to: {event.what}")
+    if event.what != work.state.last_failure:
+        work.log(f"the station did not answer as it has to: {event.what}")
+    work.state.last_failure = event.what
     work.signals.append(Signal.CHANNEL_FAILED)
 
 

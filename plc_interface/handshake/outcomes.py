@@ -77,6 +77,8 @@ def hide(work: Work, outcome: Outcome) -> None:
     Its sequence is used up: in answer to a later trigger it is refused, not taken for that trigger's fruit.
     """
     journal = work.state.journal
+    if outcome.sequence in journal.hidden:
+        return  # and the station has noted it
     work.log(f"inspection {outcome.sequence} belongs to a trigger that was refused: it is called off")
     work.durable = True
     work.update_journal(

@@ -27,7 +27,7 @@ def resynchronise(work: Work) -> None:
     if not isinstance(work.event, OpenAnswered):
         return
     state, opened = work.state, work.event.opened
-    state.open_request = None
+    state.open_request, state.last_failure = None, ""
     final = {outcome.sequence: outcome for outcome in (*state.journal.verdicts, *state.queue)}
     work.actions += [NotifyPublished(final[sequence]) for sequence in sorted(final)]
     for outcome in sorted(opened.outcomes, key=lambda outcome: outcome.sequence):

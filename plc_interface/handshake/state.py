@@ -106,6 +106,8 @@ class State:
     """The station has answered `Resume` at least once since this interface started."""
     open_request: int | None = None
     """The number of `RequestOpen` that is not answered."""
+    last_failure: str = ""
+    """Of a request, as logged; empty since the station answered `Resume`."""
 
     acquiring: bool = True
     """The station may be at the fruit in the nest; after a start this is unknown until a beat reports IDLE."""

@@ -111,3 +111,32 @@ def test_what_is_called_off_before_it_hinders_no_adoption_of_the_plcs_own(bench)
     assert made.state.journal.hidden == ()
     assert [outcome.sequence for outcome in made.state.queue] == [42]
     assert made.state.running.sequence == 43
+
+
+def test_what_was_called_off_is_called_off_once(bench):
+    """An older result waits for the PLC, so that it cannot be acknowledged in the PLC's stead."""
+    older = bench().outcome()
+    made = bench(Journal(queue=(older,), highest=41, acknowledged=40, disowned=(8,), accepted_id=7))
+    called_off = made.outcome(sequence=42, trigger_id=8)
+    made.link(Open(running=None, outcomes=(older, called_off)))
+    made.feed(ev.OutcomeNoted, 42)
+    made.actions.clear()
+    for _ in range(3):
+        made.feed(ev.RequestFailed, "a note was lost")
+        made.link(Open(running=None, outcomes=(older, called_off)))
+    assert made.state.journal.hidden == (42,)
+    assert [note.outcome.sequence for note in made.of(do.NotifyPublished)] == [41, 41, 41]
+    assert made.of(do.SaveJournal) == []
+
+
+def test_a_request_that_fails_with_each_beat_is_logged_once(bench):
+    made = bench()
+    made.armed()
+    made.actions.clear()
+    for what in ("the records are damaged", "the records are damaged", "no answer", "no answer"):
+        made.feed(ev.RequestFailed, what)
+        made.feed(ev.Beat, made.station_state())
+    assert [each.text.rpartition(": ")[2] for each in made.of(do.Log)] == ["the records are damaged", "no answer"]
+    made.feed(ev.OpenAnswered, made.state.open_request, Open(running=None, outcomes=()))
+    made.feed(ev.RequestFailed, "no answer")
+    assert "no answer" in made.of(do.Log)[-1].text
