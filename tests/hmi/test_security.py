@@ -94,7 +94,7 @@ class TestRequests:
             assert b"was not sent from a page of this browser" in body
 
     def test_every_route_that_changes_something_asks_for_a_token(self, pages):
-        """Links from other sites come with the cookie. The API's tokens are no cookies; `/here` restarts idle time."""
+        """The cookie alone orders nothing. `/here` only restarts the idle time; the API has its own tests."""
         log_in(pages)
         routes = [route for module in modules() for route in module.router.routes if route.methods - SAFE_METHODS]
         asked = [route.path for route in routes if not route.path.startswith("/api/") and route.path != "/here"]
