@@ -47,9 +47,12 @@ def chips(terms: Terms, lot: str | None, today: datetime) -> list[Chip]:
 def days(terms: Terms, today: datetime) -> Days:
     """Return the day of the search, today where it has none, and the days beside it."""
     try:
-        shown = datetime.fromisoformat(terms["from"])
-    except ValueError:
-        shown = today
+        return _beside(terms, datetime.fromisoformat(terms["from"]).astimezone())
+    except (ValueError, OverflowError):  # a day beside the calendar's first or last
+        return _beside(terms, today)
+
+
+def _beside(terms: Terms, shown: datetime) -> Days:
     before, after = (_address(terms, _day(shown + timedelta(days=step))) for step in (-1, 1))
     return Days(round(1000 * shown.timestamp()), before, after)
 

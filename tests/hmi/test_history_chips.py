@@ -1,7 +1,9 @@
 """Searches by one touch: what each link asks for, beside the conditions that are there."""
 
 from datetime import datetime
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, urlencode, urlsplit
+
+import pytest
 
 from hmi.history.chips import chips, days
 
@@ -33,3 +35,10 @@ def test_days_go_over_the_months_end_and_start_at_the_searchs_day():
     shown = {**NO_TERMS, "from": "2025-12-31T10:00"}
     assert asked(days(shown, NOW).after) == {"from": "2026-01-01T00:00", "to": "2026-01-02T00:00"}
     assert asked(days({**NO_TERMS, "from": "nonsense"}, NOW).after)["from"] == "2026-03-02T00:00"
+
+
+@pytest.mark.parametrize("day", ["0001-01-01T00:00", "9999-12-30T00:00", "9999-12-31T00:00", "0001-01-02T00:00+14:00"])
+def test_an_end_of_the_calendar_has_no_day_beside_it(pages, day):
+    assert days({**NO_TERMS, "from": day}, NOW) == days(NO_TERMS, NOW)
+    with pages.context.past:
+        assert pages("GET", f"/history?{urlencode({'from': day})}")[0] < 500
