@@ -100,10 +100,10 @@ _REFUSALS: Mapping[Refusal, str] = {
     Refusal.BUSY: "An inspection is under way",
     Refusal.QUEUE_FULL: "Results wait for their acknowledgement",
     Refusal.BAD_TRIGGER_ID: "The trigger id is 0 or the one of the trigger before",
-    Refusal.OFFLINE: "The PLC has set offline",
+    Refusal.OFFLINE: "The PLC has set offline, or the interface is about to end",
     Refusal.STATION_LOST: "The station does not answer",
     Refusal.RECIPE_CHANGING: "A recipe is being changed",
-    Refusal.NOT_WRITER: "The client does not have the write lock",
+    Refusal.NOT_WRITER: "Reserved: a client without the write lock gets exception 06",
     Refusal.RECORDS_FULL: "The station could not store the trigger",
 }
 REFUSAL_CODES = {
@@ -126,11 +126,11 @@ COMMAND_CODES = {
 """In the order of `CommandName`, from 1."""
 
 COMMAND_RESULT_CODES = {
-    0: Code("none", "No command since the interface started"),
+    0: Code("none", "No command yet; a start of the interface keeps the last one's result"),
     1: Code("executing", "Being carried out"),
     2: Code("done", "Done"),
     3: Code("failed", "The station failed to execute it; its log and its HMI give the reason"),
-    4: Code("timed_out", "The station did not end it in time"),
+    4: Code("timed_out", "The station did not end it in time, or the interface was restarted meanwhile"),
     5: Code("station_lost", "The station does not answer"),
     6: Code("no_command", "The command code is 0"),
 }
