@@ -8,8 +8,9 @@
     es: ["qwertyuiop", "asdfghjklñ", "zxcvbnm-_"],
     en: ["qwertyuiop", "asdfghjkl", "zxcvbnm-_"],
   };
-  const SIGNS = ["1234567890", "-_/.,:;+#'", "@()&\"!?=%"];
-  const ACCENTS = { de: [], es: ["áéíóúü¿¡"], en: [] };
+  const SIGNS = ["1234567890", "-_/.,:;+#'*\\", "@()&\"!?=%|<>"];
+  const BRACKETS = "[]{}";
+  const ACCENTS = { de: "", es: "áéíóúü¿¡", en: "" };
   const DIGITS = ["789", "456", "123", "-0.,"];
   const language = document.documentElement.lang in LETTERS ? document.documentElement.lang : "en";
   let field = null;
@@ -26,7 +27,7 @@
     if (numeric()) {
       return DIGITS;
     }
-    return layer === "signs" ? [...SIGNS, ...ACCENTS[language]] : [first, ...LETTERS[language]];
+    return layer === "signs" ? [...SIGNS, BRACKETS + ACCENTS[language]] : [first, ...LETTERS[language]];
   }
 
   function key(label, name, press) {
@@ -79,6 +80,9 @@
         }),
         key(" ", "space", () => write(" ")),
       );
+    }
+    if (field instanceof HTMLTextAreaElement) {
+      last.append(key("⏎", "enter", () => write("\n")));
     }
     last.append(
       key("⌫", "erase", () => write("")),

@@ -5,6 +5,7 @@ import re
 import zipfile
 from collections.abc import Callable
 from typing import Any
+from urllib.parse import parse_qs
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
@@ -15,6 +16,8 @@ from station.records.database import reading
 from tests.chromium import follow
 
 pytestmark = pytest.mark.timeout(400)
+KEY_PX = 15 / 25.4 * (1280**2 + 800**2) ** 0.5 / 10.1 - 1
+"""15 mm on a 10.1" panel of 1280 x 800."""
 
 
 def audited(site: Any, action: str) -> list[Any]:
@@ -118,6 +121,27 @@ def test_a_verification_without_a_calibration_says_what_to_do(orchard: Any, pane
         expect(page.get_by_role("button", name="Calibrate")).to_be_visible()
         assert page.get_by_role("button", name="Verify").count() == 0
         assert page.get_by_text("None yet.").count() == 2
+
+
+def test_places_are_typed_at_a_panel_one_per_line(orchard: Any, panel: Any) -> None:
+    person = panel("Max", locale="es")
+    person.go("/panel")
+    with orchard.manual_mode():
+        page = person.go("/maintenance/sensor")
+        board = page.locator("[data-keyboard]")
+        page.locator("[name=places]").click()
+        board.locator(".keycap-layer").click()
+        for key in ("4", ";", "Espacio", "0", "Línea nueva", "0", ";", "Espacio", "3"):
+            board.get_by_role("button", name=key, exact=True).click()
+        assert set("[]{}<>|\\*¿") <= set(board.inner_text())
+        boxes = [key.bounding_box() for key in board.get_by_role("button").all()]
+        assert min(box["height"] for box in boxes) >= KEY_PX
+        assert min(box["width"] for box in boxes) >= KEY_PX
+        board.locator(".keycap-done").click()
+        page.route("**/sensor/begin", lambda route: route.abort())
+        with page.expect_request("**/sensor/begin") as sent:
+            page.locator("form:has([name=places])").evaluate("form => form.requestSubmit()")
+        assert parse_qs(sent.value.post_data)["places"] == ["4; 0\r\n0; 3"]
 
 
 def test_maintenance_downloads_a_support_bundle_and_a_viewer_does_not(
