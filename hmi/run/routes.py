@@ -150,7 +150,10 @@ async def fruit(request: Request, hmi: HmiNow, locale: LocaleNow, sequence: Sequ
 
 @router.get("/fruit/{sequence}/picture.svg")
 async def picture(hmi: HmiNow, sequence: Sequence) -> Response:
-    """Send a fruit's picture with the contact's outline; it never changes, so a browser fetches it once."""
+    """Send a fruit's picture with the contact's outline; a browser fetches it once.
+
+    The address ends with the fruit's end, which is not read here: a number alone comes again after the records are removed.
+    """
     found = await hmi.gateway.request(GetPicture(sequence=sequence), Picture)
     base64.b64decode(found.jpeg, validate=True)
     corners = " ".join(f"{x},{y}" for x, y in found.outline)

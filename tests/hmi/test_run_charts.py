@@ -1,10 +1,12 @@
 """The run page's charts: every point and limit of the curve, and the trend of rejects."""
 
+import re
 import xml.etree.ElementTree as ET
 
 import pytest
 
 from hmi.run import charts
+from hmi.run.routes import fruit_values
 from hmi.web.translation import Locale
 from station.channel.panel_live import CurvePointSummary, Fruit, FruitSummary, LimitView
 from station.vocabulary import OutcomeName
@@ -57,3 +59,16 @@ def test_a_trend_counts_tens():
     many = [fruit(outcome).short for outcome in outcomes]
     drawn = ET.fromstring(charts.trend(many, Locale("en")))
     assert drawn.attrib["aria-label"].endswith("0, 3")
+
+
+def test_fruit_of_one_number_have_pictures_of_their_own(pages):
+    """A browser keeps a picture for ever, and numbers begin at 1 again when the records are removed."""
+
+    def picture(ended_utc_ms):
+        shown = fruit()
+        shown = shown.model_copy(update={"short": shown.short.model_copy(update={"ended_utc_ms": ended_utc_ms})})
+        values = {**fruit_values(shown, Locale("en")), "on_run": True, "never_inspected": False}
+        return re.findall('src="([^"]+)"', pages.context.renderer.render("run_fruit.html.j2", Locale("en"), values))
+
+    assert picture(1_700_000_000_000) != picture(1_700_000_000_001)
+    assert picture(1_700_000_000_000) == picture(1_700_000_000_000) != []
