@@ -135,7 +135,7 @@ def fruit_values(fruit: Fruit | None, locale: Locale) -> Mapping[str, Any]:
 @router.get("/")
 async def run(request: Request) -> Response:
     """Show the page."""
-    return show(request, "run.html.j2")
+    return show(request, "run.html.j2", most_recent=MOST_RECENT)
 
 
 @router.get("/fruit/{sequence}")

@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from hmi.run import charts
-from hmi.run.routes import fruit_values
+from hmi.run.routes import MOST_RECENT, fruit_values
 from hmi.web.translation import Locale
 from station.channel.panel_live import CurvePointSummary, Fruit, FruitSummary, LimitView
 from station.vocabulary import OutcomeName
@@ -72,3 +72,7 @@ def test_fruit_of_one_number_have_pictures_of_their_own(pages):
 
     assert picture(1_700_000_000_000) != picture(1_700_000_000_001)
     assert picture(1_700_000_000_000) == picture(1_700_000_000_000) != []
+
+
+def test_the_latest_fruit_are_announced_as_many_as_are_shown(pages):
+    assert f'aria-label="The last {MOST_RECENT} fruit"'.encode() in pages("GET", "/")[2]
