@@ -152,7 +152,8 @@ async def fruit(request: Request, hmi: HmiNow, locale: LocaleNow, sequence: Sequ
 async def picture(hmi: HmiNow, sequence: Sequence) -> Response:
     """Send a fruit's picture with the contact's outline; a browser fetches it once.
 
-    The address ends with the fruit's end, which is not read here: a number alone comes again after the records are removed.
+    Its address on a page ends with the fruit's end, which is not read here: a number comes again after the records
+    are removed.
     """
     found = await hmi.gateway.request(GetPicture(sequence=sequence), Picture)
     base64.b64decode(found.jpeg, validate=True)
