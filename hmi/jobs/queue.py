@@ -99,6 +99,7 @@ class Jobs:
         self._home, self._command = home, tuple(command)
         self._jobs: dict[str, Job] = {}
         self._turn = asyncio.Lock()
+        self._cleared = False
 
     def folder(self, files: Mapping[str, str] = MappingProxyType({})) -> Path:
         """Make a new job's folder, whose name is its id, with texts as files by their names.
@@ -110,8 +111,11 @@ class Jobs:
             raise JobError(messages.TOO_MANY(number=MOST_WAITING))
         folder = self._home / FOLDER / uuid.uuid4().hex
         try:
-            if not self._jobs:
-                shutil.rmtree(folder.parent, ignore_errors=True)  # of the start before
+            # Of the start before. Once, as a folder has no job yet while its caller prepares it; and not at this start,
+            # which may still fail because other pages of this home have the port.
+            if not self._cleared:
+                shutil.rmtree(folder.parent, ignore_errors=True)
+                self._cleared = True
             folder.mkdir(parents=True)
             for name, text in files.items():
                 (folder / name).write_text(text, encoding="utf-8")

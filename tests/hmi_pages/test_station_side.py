@@ -88,6 +88,14 @@ def test_a_job_called_off_ends_its_process_and_too_many_are_refused(tmp_path: Pa
     with_jobs(tmp_path, WAIT, work)
 
 
+def test_folders_of_the_start_before_are_removed_and_none_of_this_one(tmp_path: Path) -> None:
+    before = Jobs(tmp_path).folder()
+    jobs = Jobs(tmp_path)
+    assert before.exists(), "of pages that have the port, perhaps"
+    folders = [jobs.folder(), jobs.folder()]
+    assert [folder.exists() for folder in (before, *folders)] == [False, True, True]
+
+
 def test_the_worker_refuses_more_than_it_can_hold() -> None:
     async def run() -> None:
         worker, going = PanelWorker(), threading.Event()
