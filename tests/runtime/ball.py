@@ -16,6 +16,8 @@ from station.channel.panel_maintenance_queries import (
 MAX = Actor(who="Max", role="maintenance")
 PLACES = ((-2.5, 0.0),)
 """A second one, at which the run waits for the person."""
+PRESSED_S = 240.0
+"""Longest wait for a whole press of the ball, on a busy machine."""
 
 
 async def stop(panel: ChannelClient) -> None:
@@ -45,7 +47,7 @@ async def until_waits(cell: Any, panel: ChannelClient) -> None:
         assert run.state in {"running", "waiting"}, run
         return run.state == "waiting"
 
-    await cell.until(waits)
+    await cell.until(waits, PRESSED_S)
 
 
 async def end_run(panel: ChannelClient) -> CalibrationRunView:

@@ -18,7 +18,7 @@ from station.runtime.state_files import StateFiles
 from tests.runtime.ball import MAX, end_run, run_now, start_run, stop, until_waits
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(500)
 def test_a_reset_while_the_ball_is_pressed_is_refused_and_moves_nothing(at_ball):
     async def scenario():
         async with at_ball(bench=False) as (cell, panel, entered):
@@ -44,7 +44,7 @@ def test_a_reset_while_the_ball_is_pressed_is_refused_and_moves_nothing(at_ball)
     asyncio.run(scenario())
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(500)
 def test_a_link_that_returns_during_a_run_moves_nothing_before_a_person_resets(at_ball):
     """The run was begun without a *Stop*."""
 

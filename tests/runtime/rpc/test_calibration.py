@@ -11,7 +11,7 @@ from station.calibration.store import Prepared
 from station.records.audit_report import read_audit
 from station.records.database import reading
 from station.runtime.rpc.calibration import PanelCalibration
-from tests.runtime.ball import end_run, run_now, start_run
+from tests.runtime.ball import PRESSED_S, end_run, run_now, start_run
 
 DEADLINE_S = 2.0
 """The records' default."""
@@ -24,7 +24,7 @@ def stored(cell):
     return cell.station.service._devices.calibration.calibration, audited
 
 
-@pytest.mark.timeout(240)
+@pytest.mark.timeout(400)
 def test_a_calibration_that_the_disk_delays_is_not_called_failed_nor_called_off(at_ball, monkeypatch):
     begun, called_off = threading.Event(), threading.Event()
     put_in_force, close = Prepared.put_in_force, PanelCalibration.close
@@ -45,7 +45,7 @@ def test_a_calibration_that_the_disk_delays_is_not_called_failed_nor_called_off(
     async def scenario():
         async with at_ball() as (cell, panel, _):
             await start_run(panel, ())
-            await cell.until(begun.is_set)
+            await cell.until(begun.is_set, PRESSED_S)
             ended = await end_run(panel)
             assert ended.state == "passed", ended
             calibration, audited = stored(cell)
@@ -55,7 +55,7 @@ def test_a_calibration_that_the_disk_delays_is_not_called_failed_nor_called_off(
     asyncio.run(scenario())
 
 
-@pytest.mark.timeout(240)
+@pytest.mark.timeout(400)
 def test_a_calibration_whose_transaction_fails_is_not_in_force(at_ball, monkeypatch):
     put_in_force = Prepared.put_in_force
 
@@ -72,7 +72,7 @@ def test_a_calibration_whose_transaction_fails_is_not_in_force(at_ball, monkeypa
             async def over():
                 return (await run_now(panel)).state != "running"
 
-            await cell.until(over)
+            await cell.until(over, PRESSED_S)
             run = await run_now(panel)
             assert run.state == "failed"
             assert "No space left on device" in str(run.result)
