@@ -89,14 +89,16 @@ async def own_pin(request: Request, hmi: HmiNow, caller: GenuineCaller, old: Pin
     hmi.pins.tried(*who)
     async with _CHECKING:
         role = await asyncio.to_thread(hmi.people.check, caller.name, old)
-        if role is None:
-            return _page(request, hmi, "/", "people.wrong_pin", status=403)
-        hmi.pins.right(*who)
-        try:
-            await asyncio.to_thread(hmi.people.put, caller.name, role, pin)
-        except UserStoreError as error:
-            return _page(request, hmi, "/", error.key, error.detail)
-        hmi.sessions.forget(caller.name)
+        if role is not None:
+            hmi.pins.right(*who)
+            try:
+                await asyncio.to_thread(hmi.people.put, caller.name, role, pin)
+            except UserStoreError as error:
+                return _page(request, hmi, "/", error.key, error.detail)
+            hmi.sessions.forget(caller.name)
+    if role is None:
+        await _note(hmi, caller, "log_in_refused", address_of(request))
+        return _page(request, hmi, "/", "people.wrong_pin", status=403)
     await _note(hmi, caller, "changed", caller.name)
     return _logged_in(request, hmi, caller.name, role, "/people")
 

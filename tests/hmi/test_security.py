@@ -204,6 +204,20 @@ class TestLogIn:
         assert pages.post("/people/own-pin", csrf=pages.token(), old=PIN, pin=OTHER_PIN)[0] == 429
         assert pages.context.people.check("admin", PIN) is Role.ADMIN
 
+    @pytest.mark.parametrize(("path", "field"), [("/people/log-in", "pin"), ("/people/own-pin", "old")])
+    def test_every_refused_pin_is_in_the_audit_trail(self, pages, monkeypatch, path, field):
+        noted = []
+
+        async def request(_, what, *__, **___):
+            noted.append((what.what, what.person.who, what.subject))
+
+        monkeypatch.setattr(Gateway, "request", request)
+        pages.context.people.begin("admin", PIN)
+        log_in(pages)
+        fields = {"name": "admin", "pin": PIN, field: OTHER_PIN}
+        assert pages.post(path, csrf=pages.token(), **fields)[0] == 403
+        assert noted == [("log_in_refused", "admin", "127.0.0.1")]
+
     def test_wrong_pins_have_to_wait(self, pages):
         pages.context.people.begin("admin", PIN)
         for _ in range(FREE_TRIES + 1):
