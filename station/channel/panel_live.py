@@ -83,7 +83,6 @@ class PersonNoted(ChannelMessage):
         "changed",
         "removed",
         "cleaning",
-        "unlocked",
         "token_refused",
         "support_bundle",
         "configuration_saved",

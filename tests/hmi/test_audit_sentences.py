@@ -1,13 +1,23 @@
 """Rows of the audit trail as sentences: who, what, what changed, and why not."""
 
+import ast
 import json
+import re
 from dataclasses import replace
+from typing import get_args
 
 import pytest
 
 from hmi.history.audit_sentences import sentence
+from hmi.web.folders import HMI
+from hmi.web.text import texts
 from hmi.web.translation import Locale
+from station.channel.line import CommandName
+from station.channel.panel_live import OperatorCommandName, PersonNoted
+from station.recipe_store.revision import Origin
 from station.records.audit import AuditRow
+from station.runtime.observability.audit_logger import AlarmChange
+from station.runtime.production.operator_commands import _COMMANDS
 
 FRUIT = {2: "Blueberry", 7: "Elsanta"}
 
@@ -46,3 +56,32 @@ def test_a_changed_limit_is_shown_and_fingerprints_are_not():
 def test_a_row_of_another_version_or_with_shortened_values_is_shown_all_the_same():
     cut = replace(row("press.polished", "jaws"), new='{"text": "# a rec')
     assert sentence(cut, {}, Locale("en")) == ("Ida, Quality", "press.polished: jaws", ())
+
+
+ENUMERATED = {
+    "alarm": get_args(AlarmChange),
+    "command": {*CommandName, *OperatorCommandName} - {name for name in _COMMANDS if name not in set(CommandName)},
+    "panel": get_args(PersonNoted.model_fields["what"].annotation),
+    "recipe": set(Origin) - {Origin.SUBMITTED},
+}
+"""Actions that the code puts together of two parts; every other one is written in it whole."""
+FILES = {"html", "json", "py"}
+
+
+def test_every_action_of_the_audit_trail_has_a_sentence_and_no_sentence_is_left_over():
+    told = {name.removeprefix("audit.") for name in texts() if name.startswith("audit.")}
+    told = {name for name in told if "." in name and not name.startswith("role.")}
+    whole = re.compile(rf"(?:{'|'.join({name.partition('.')[0] for name in told})})\.[a-z_]+")
+    noted = {f"{family}.{each}" for family, names in ENUMERATED.items() for each in names}
+    folders = (HMI.parent / "station", HMI / "api")
+    for path in (path for folder in folders for path in folder.rglob("*.py") if "messages" not in path.parts):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            match node:
+                case ast.Constant(value=str(text)) if whole.fullmatch(text) and text.partition(".")[2] not in FILES:
+                    noted.add(text)
+                case ast.Call(func=ast.Name(id="AuditEntry"), args=[ast.Starred(), action, *_] | [_, _, action, *_]):
+                    if isinstance(action, ast.Constant):
+                        noted.add(action.value)
+                    elif isinstance(action, ast.JoinedStr):
+                        assert ast.unparse(action.values[0]).strip("'.") in ENUMERATED, path
+    assert noted == told

@@ -20,7 +20,7 @@ from station.messages import alarm_commands as messages
 from station.messages.message import Message
 from station.records.audit import AuditEntry, validate_entry
 from station.runtime.alarms.manager import AlarmManager
-from station.runtime.observability.audit_logger import AuditLogger, alarm_entry
+from station.runtime.observability.audit_logger import AlarmChange, AuditLogger, alarm_entry
 
 
 class AlarmCommands:
@@ -86,7 +86,7 @@ class AlarmCommands:
         alarm, entry = self._checked(request, "unshelved")
         return self._done(self._alarms.unshelve(alarm), entry)
 
-    def _checked(self, request: AlarmAction, change: str, reason: str = "") -> tuple[AlarmId, AuditEntry]:
+    def _checked(self, request: AlarmAction, change: AlarmChange, reason: str = "") -> tuple[AlarmId, AuditEntry]:
         """Return the alarm and its audit entry, which is validated before anything changes."""
         if request.alarm not in set(AlarmId):
             raise BadInputError(messages.UNKNOWN(alarm=repr(request.alarm), example=AlarmId.DISK_LOW))

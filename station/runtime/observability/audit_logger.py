@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 from station.channel.line import Command, CommandDone
 from station.messages.message import Message
@@ -16,6 +16,8 @@ PANEL = "panel"
 RETRY_S = 2.0
 FLUSH_S = 3.0
 MOST_WAITING = 10_000
+
+AlarmChange: TypeAlias = Literal["acknowledged", "shelved", "unshelved", "reset"]
 
 log = logging.getLogger(__name__)
 
@@ -102,12 +104,11 @@ def verification_entry(who: str, subject: str, calibration: str, verification: s
     return AuditEntry(who, "service", "calibration.verified", subject, "", None, new)
 
 
-def alarm_entry(who: str, role: str, change: str, alarm: str, reason: str = "") -> AuditEntry:
+def alarm_entry(who: str, role: str, change: AlarmChange, alarm: str, reason: str = "") -> AuditEntry:
     """Make the entry of an alarm that a person or the PLC changed.
 
     Args:
         who: `plc`, `panel` or a person's name.
-        change: `acknowledged`, `shelved`, `unshelved` or `reset`.
         reason: as for shelving.
     """
     return AuditEntry(who, role, f"alarm.{change}", f"alarm {alarm}", reason)

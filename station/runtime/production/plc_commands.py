@@ -18,7 +18,7 @@ from station.messages.maintenance import UNDER_WAY
 from station.messages.message import Message, message_of
 from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import DeviceManager
-from station.runtime.observability.audit_logger import PANEL, PLC, alarm_entry, command_entry
+from station.runtime.observability.audit_logger import PANEL, PLC, AlarmChange, alarm_entry, command_entry
 from station.runtime.observability.observability import Observability
 from station.runtime.production.lots import LotManager
 from station.runtime.recipes.active import ActiveRecipes
@@ -34,7 +34,7 @@ STOP_WITHIN_S = 0.5
 PRODUCTION = 1
 MODES = (PRODUCTION, 2, 3)
 _STOPPED = "stopped_by_a_person"
-_ON_ALARMS = {CommandName.CLEAR_ALARMS: "acknowledged", CommandName.RESET: "reset"}
+_ON_ALARMS: dict[CommandName, AlarmChange] = {CommandName.CLEAR_ALARMS: "acknowledged", CommandName.RESET: "reset"}
 
 
 class PlcCommands:

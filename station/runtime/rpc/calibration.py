@@ -129,7 +129,7 @@ class PanelCalibration:
         if why := self._why_not(self._devices.cell.camera.description.serial):
             raise StationError(why)
         run = self._run = _Run(request.kind, request.actor)
-        self._note(request.actor, "begun")
+        self._note(request.actor, "calibration.begun")
         undisturbed = contextlib.ExitStack()
         undisturbed.enter_context(self._service.manual(_NAMES[request.kind]()))
         self._devices.use(by_inspection=True)
@@ -153,7 +153,7 @@ class PanelCalibration:
         if run is None:
             raise BadInputError(messages.NOT_BEGUN())
         if run.open:
-            self._note(request.actor, "called_off")
+            self._note(request.actor, "calibration.called_off")
             await self.close()
         return _run_view(run)
 
@@ -265,9 +265,9 @@ class PanelCalibration:
         description = self._devices.cell.camera.description
         return Unit(description.serial, description.name, simulated=self._site.camera.driver != "digit")
 
-    def _note(self, actor: Actor, what: str) -> None:
+    def _note(self, actor: Actor, action: str) -> None:
         kind = self._run.kind if self._run is not None else "run"
-        self._audit.log(AuditEntry(actor.who, actor.role, f"calibration.{what}", kind))
+        self._audit.log(AuditEntry(actor.who, actor.role, action, kind))
 
     def _verification_view(self, made: Verification) -> CalibrationView:
         ratio = None if made.area_ratio is None else messages.RATIO_OF_BALL(percent=100 * made.area_ratio)

@@ -150,7 +150,7 @@ class PanelMaintenance:
         gripper, width_mm = self._devices.cell.gripper, request.width_mm
         if (request.to == "width") != (width_mm is not None):
             raise StationError(messages.JOG_WIDTH())
-        self._check(request.actor, "jog", request.to)
+        self._check(request.actor, "maintenance.jog", request.to)
         if request.to == "stop":
             reading = await gripper.stop()
         else:
@@ -164,14 +164,16 @@ class PanelMaintenance:
                     reading = (await gripper.move_to_width(wide_mm, JOG_SPEED_MM_S, JOG_FORCE_N)).reading
         self._devices.monitors[GRIPPER].report_success()
         where = f"{reading.width_mm:.1f} mm"
-        self._note(request.actor, "jog", request.to if width_mm is None else f"{width_mm:g} mm", {"reached": where})
+        self._note(
+            request.actor, "maintenance.jog", request.to if width_mm is None else f"{width_mm:g} mm", {"reached": where}
+        )
         return Jogged(width_mm=reading.width_mm, object_state=reading.object_state.value, active=reading.active)
 
     async def set_leds(self, request: SetLeds) -> LedsSet:
         """Set the sensor's light; the next start of the camera sets its own again."""
-        self._check(request.actor, "leds", "camera")
+        self._check(request.actor, "maintenance.leds", "camera")
         await self._devices.cell.camera.set_leds(Leds(request.red, request.green, request.blue))
-        self._note(request.actor, "leds", "camera", [request.red, request.green, request.blue])
+        self._note(request.actor, "maintenance.leds", "camera", [request.red, request.green, request.blue])
         return LedsSet()
 
     async def live_image(self, request: GetLiveImage) -> LiveImage:
@@ -199,13 +201,13 @@ class PanelMaintenance:
         """Return the last lines of the log."""
         return Log(lines=self._log.last(request.limit, request.level))
 
-    def _check(self, actor: Actor, command: str, subject: str) -> None:
+    def _check(self, actor: Actor, action: str, subject: str) -> None:
         if why := self.refusal():
-            self._note(actor, command, subject, {"done": False, "why": str(why)})
+            self._note(actor, action, subject, {"done": False, "why": str(why)})
             raise NotNowError(why)
 
-    def _note(self, actor: Actor, command: str, subject: str, new: object) -> None:
-        self._audit.log(AuditEntry(actor.who, actor.role, f"maintenance.{command}", subject, new=new))
+    def _note(self, actor: Actor, action: str, subject: str, new: object) -> None:
+        self._audit.log(AuditEntry(actor.who, actor.role, action, subject, new=new))
 
     def _live(self, frame: Frame, segmentation: Segmentation | None, why: Message | None) -> LiveImage:
         image, contact = frame.image, None
