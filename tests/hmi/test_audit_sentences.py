@@ -81,7 +81,7 @@ def test_every_action_of_the_audit_trail_has_a_sentence_and_no_sentence_is_left_
                     noted.add(text)
                 case ast.Call(func=ast.Name(id="AuditEntry"), args=[ast.Starred(), action, *_] | [_, _, action, *_]):
                     if isinstance(action, ast.Constant):
-                        noted.add(action.value)
+                        noted.add(str(action.value))
                     elif isinstance(action, ast.JoinedStr):
                         assert ast.unparse(action.values[0]).strip("'.") in ENUMERATED, path
     assert noted == told
