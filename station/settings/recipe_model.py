@@ -14,8 +14,9 @@ from station.settings.segmentation import Segmentation
 _LIGHT_TOUCH = 0.5
 """Share of a limit's closing from which the judge takes its steps into account: `LIGHT_TOUCH` of `inspection.evidence`,
 which no settings import."""
-_HALF_COUNT_MM = 0.2
-"""By so much a step may go further than asked for: the gripper goes to the nearest count, of 85 mm / 227 = 0.37 mm."""
+_AT_CLOSING_MM = 0.22
+"""A step asked for so little before a closing may be taken for one at it: the gripper goes to the nearest count, of
+85 mm / 227 = 0.37 mm, and the judge takes what is 0.03 mm short for the closing, `AT_MM` of `inspection.evidence`."""
 
 
 def _integer(value: object) -> object:
@@ -292,7 +293,7 @@ class Recipe(Settings):
             if together and index < len(area) - 1:
                 continue
             from_mm = _LIGHT_TOUCH * (area[0] if together else threshold).closing_mm
-            below_mm = threshold.closing_mm - _HALF_COUNT_MM
+            below_mm = threshold.closing_mm - _AT_CLOSING_MM
             if not any(from_mm <= number * step_mm < below_mm for number in range(1, self.steps.number + 1)):
                 expected = messages.JUDGED_ON_ONE_STEP(
                     step_mm=step_mm, from_mm=from_mm, below_mm=round(below_mm, 6), value=threshold.closing_mm

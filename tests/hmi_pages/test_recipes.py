@@ -118,7 +118,7 @@ def test_a_draft_is_tried_on_what_was_inspected(orchard: Any, panel: Any) -> Non
     page = panel("Quin").go("/recipes/strawberry")
     follow(page.get_by_role("button", name="What would it have decided?"))
     follow(page.get_by_role("link", name="Open whatif.html"))
-    expect(page.get_by_text("What if: Strawberry").first).to_be_visible()
+    expect(page.frame_locator("iframe").get_by_text("What if: Strawberry").first).to_be_visible()
 
 
 @pytest.mark.parametrize("decimal", [".", ","])

@@ -75,7 +75,7 @@ def test_a_story_that_broke_a_law_holds_them_now(seed, fruits, carries, troubles
 
 
 def test_an_acknowledgement_that_the_journal_lacks_doubles_no_outcome(monkeypatch: pytest.MonkeyPatch):
-    """Story 465, as found: then the journal had no reserve on a full disk."""
+    """Found by story 465, when the journal had no reserve on a full disk; by now seed 7 meets the troubles so."""
     save = interface.Interface._save
 
     def refused(self: interface.Interface, journal: Journal) -> None:
@@ -84,9 +84,9 @@ def test_an_acknowledgement_that_the_journal_lacks_doubles_no_outcome(monkeypatc
 
     monkeypatch.setattr(interface.Interface, "_save", refused)
     troubles = (Trouble("disk", "full", 57.112, 0.234), Trouble("interface", "kill", 57.344, 0.743))
-    assert play(Story(seed=465, fruits=30, troubles=troubles, carries=False)).broken is None
+    assert play(Story(seed=7, fruits=30, troubles=troubles, carries=False)).broken is None
     monkeypatch.setattr(inputs, "take_unwritten", lambda *_: None)
-    broken = play(Story(seed=465, fruits=30, troubles=troubles, carries=False)).broken
+    broken = play(Story(seed=7, fruits=30, troubles=troubles, carries=False)).broken
     assert broken is not None
     assert broken.law == laws.NONE_DOUBLED
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from station.errors import BadInputError
-from station.inspection.evidence import LIGHT_TOUCH
+from station.inspection.evidence import AT_MM, LIGHT_TOUCH
 from station.inspection.judge import early_stop, judge
 from station.inspection.press import Measured, Press
 from station.messages import settings as messages
@@ -222,17 +222,17 @@ BAD = {
     "judged on one step": (
         r"\[4, 8\](?s:(.*))    - closing_mm: 4\n.*\n(.*)- closing_mm: 8",
         r"[1]\1\2- closing_mm: 1",
-        [f"23: damage.area[0].closing_mm: {ONE_STEP.format(below_mm=0.8, got=1)}"],
+        [f"23: damage.area[0].closing_mm: {ONE_STEP.format(below_mm=0.78, got=1)}"],
     ),
     "limits judged on one step together": (
         r"\[4, 8\](?s:(.*))- closing_mm: 4(?s:(.*))- closing_mm: 8",
         r"[1, 1.1]\1- closing_mm: 1\2- closing_mm: 1.1",
-        [f"25: damage.area[1].closing_mm: {ONE_STEP.format(below_mm=0.9, got=1.1)}"],
+        [f"25: damage.area[1].closing_mm: {ONE_STEP.format(below_mm=0.88, got=1.1)}"],
     ),
     "each limit judged by itself": (
         r"\[4, 8\](?s:(.*))damage:(?s:(.*))- closing_mm: 4",
         r"[1, 8]\1damage:\n  decided_by: every_trusted\2- closing_mm: 1",
-        [f"24: damage.area[0].closing_mm: {ONE_STEP.format(below_mm=0.8, got=1)}"],
+        [f"24: damage.area[0].closing_mm: {ONE_STEP.format(below_mm=0.78, got=1)}"],
     ),
     "early stop before damage": (
         r"area_mm2: 160\n  growth_mm2_per_mm: 40",
@@ -559,7 +559,7 @@ class TestFinding:
 
 def test_a_light_touch_and_a_count_are_as_the_judge_and_the_gripper_have_them():
     assert recipe_model._LIGHT_TOUCH == LIGHT_TOUCH
-    assert GripperCalibration().mm_per_count / 2 <= recipe_model._HALF_COUNT_MM
+    assert GripperCalibration().mm_per_count / 2 + AT_MM <= recipe_model._AT_CLOSING_MM
 
 
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
