@@ -115,7 +115,7 @@ PARTS = {
     ),
     "run.buttons": Part(
         "run_buttons.html.j2",
-        of_state(lambda state: (state.may, state.recoveries, state.needs_person)),
+        of_state(lambda state: (state.may, state.recoveries, state.needs_person, state.running_sequence)),
         lambda gateway, _: {"state": gateway.state, "OperatorCommandName": OperatorCommandName},
     ),
     "run.fruit": Part("run_fruit.html.j2", _fruit, _fruit_values),

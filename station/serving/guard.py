@@ -55,11 +55,11 @@ def is_this_machines(address: str) -> bool:
         return True
     if plain.is_unspecified or plain.is_multicast:
         return False
-    with socket.socket(socket.AF_INET if plain.version == 4 else socket.AF_INET6) as probe:
-        try:
+    try:
+        with socket.socket(socket.AF_INET if plain.version == 4 else socket.AF_INET6) as probe:
             probe.bind((str(plain), 0))  # the kernel binds to no other machine's
-        except OSError:
-            return False
+    except OSError:  # also where no file descriptor is left: then who asks counts as a stranger
+        return False
     return True
 
 

@@ -4,8 +4,19 @@ import asyncio
 from typing import Any
 
 from hmi.web.gateway import Gateway
+from hmi.web.roles import Role
+from hmi.web.translation import Locale
 from station.channel.line import Outcome
-from station.channel.panel_live import Fruit, FruitSummary, GetFruit, GetPanelState, GetRecent, PanelState, Recent
+from station.channel.panel_live import (
+    Fruit,
+    FruitSummary,
+    GetFruit,
+    GetPanelState,
+    GetRecent,
+    OperatorCommandName,
+    PanelState,
+    Recent,
+)
 from station.runtime.rpc.recent_inspections import RecentInspections, RestoredFruit
 from station.vocabulary import Reason
 
@@ -38,6 +49,16 @@ class Station(Gateway):
             case GetFruit():
                 return self._inspections.fruit(request.sequence)
         raise AssertionError(request)
+
+
+def test_the_button_that_aborts_a_fruit_is_the_running_ones(pages):
+    """Also where nothing else of the buttons has changed since the fruit before."""
+    for sequence in (None, 7, 8):
+        may = (OperatorCommandName.STOP, OperatorCommandName.CALL_OFF)
+        values: dict[str, Any] = {"may": may, "recoveries": (), "needs_person": False, "running_sequence": sequence}
+        pages.context.gateway.state = PanelState.model_construct(**values)
+        buttons = pages.context.live.part("run.buttons", Locale("en"), Role.OPERATOR).html
+        assert f'name="argument" value="{sequence or ""}"' in buttons
 
 
 def test_an_outcome_that_the_plc_was_given_in_place_of_the_stations_is_shown():

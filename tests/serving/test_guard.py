@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import errno
 import socket
 from pathlib import Path
 
@@ -253,6 +254,15 @@ def test_a_place_is_held_until_the_request_of_who_left_is_done(door):
 )
 def test_which_addresses_are_this_machines(address, own):
     assert is_this_machines(address) is own
+
+
+def test_without_a_file_descriptor_who_is_no_loopback_is_a_stranger(monkeypatch, card_address):
+    def none_left(*_):
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(socket, "socket", none_left)
+    assert not is_this_machines(card_address)
+    assert is_this_machines("127.0.0.1")
 
 
 def test_the_address_of_its_network_card_is_this_machines(card_address):

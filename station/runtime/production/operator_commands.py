@@ -142,9 +142,10 @@ class OperatorCommands:
         by, order, argument = (request.person.who, request.person.role), request.order, request.argument
         if order is OperatorCommandName.CALL_OFF and argument:
             if argument != str(self._service.registry.running_sequence):
-                self._audit.log_command(by[0], order, argument, why := messages.ANOTHER_FRUIT(sequence=argument), by[1])
+                why = messages.ANOTHER_FRUIT(sequence=argument)
+                self._audit.log_command(by[0], order, argument, why, by[1])
                 return why
-            argument = ""
+            argument = ""  # the command itself has none
         if order in _COMMANDS:
             if argument and not (argument.isascii() and argument.isdigit() and int(argument) <= 65_535):
                 return messages.NO_NUMBER(command=order, argument=argument)

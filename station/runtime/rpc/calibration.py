@@ -237,18 +237,22 @@ class PanelCalibration:
         Raises:
             StationError: neither is stored.
         """
-        prepared = await asyncio.to_thread(prepare)
-        storing = asyncio.create_task(
-            self._records.change_to_end(lambda connection: (append_audit(connection, entry), prepared.put_in_force()))
-        )
+
+        async def store() -> None:
+            prepared = await asyncio.to_thread(prepare)
+            try:
+                await self._records.change_to_end(
+                    lambda connection: (append_audit(connection, entry), prepared.put_in_force())
+                )
+            except StationError:
+                await asyncio.to_thread(prepared.discard)
+                raise
+
+        storing = asyncio.create_task(store(), name="storing the record of a run")
         while not storing.done():
             with contextlib.suppress(asyncio.CancelledError):
                 await asyncio.wait({storing})
-        try:
-            storing.result()
-        except StationError:
-            await asyncio.to_thread(prepared.discard)
-            raise
+        storing.result()
 
     async def _lay(self, run: _Run, place: Place) -> None:
         """Request the ball from the person, and wait until it is in place."""
