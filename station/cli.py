@@ -21,6 +21,7 @@ class Entry(NamedTuple):
 
 
 COMMANDS = {
+    "administrator": Entry("hmi.people.command:administrator", "Make the first person who may log in."),
     "alarms": Entry("station.commands.alarms:alarms", "See, acknowledge and shelve the station's alarms."),
     "analyze": Entry("station.commands.analyze:analyze_command", "Measure the deformed area in tactile images."),
     "api-token": Entry("hmi.api.command:api_token", "Make and withdraw tokens for the HTTP API."),

@@ -9,6 +9,7 @@ import click
 
 from hmi.api.tokens import NAME, ROLES, ApiTokens
 from hmi.web.roles import Role
+from hmi.web.user_store import FOLDER
 from station.records.audit import AuditEntry, append_audit
 from station.records.database import records_folder
 from station.records.direct_transaction import direct_transaction
@@ -49,7 +50,7 @@ def add(name: str, role: str, days: int | None, by: str, config: Path | None) ->
         append_audit(
             connection, AuditEntry(by, _ROLE, "token.added", f"token {name}", new={"role": role, "days": days})
         )
-        token = ApiTokens(home / "hmi").add(name, Role(role), days)
+        token = ApiTokens(home / FOLDER).add(name, Role(role), days)
     click.echo(token)
 
 
@@ -57,7 +58,7 @@ def add(name: str, role: str, days: int | None, by: str, config: Path | None) ->
 @_CONFIG
 def list_all(config: Path | None) -> None:
     """List the tokens by their names; the tokens themselves are not stored."""
-    for name, token in sorted(ApiTokens(load_configuration(config).home / "hmi").all().items()):
+    for name, token in sorted(ApiTokens(load_configuration(config).home / FOLDER).all().items()):
         ends = "" if token.expires_utc_ms is None else f", expires {_time(token.expires_utc_ms)}"
         click.echo(f"{name:40}  {token.role:10}  made {_time(token.made_utc_ms)}{ends}")
 
@@ -71,7 +72,7 @@ def remove(name: str, by: str, config: Path | None) -> None:
     home = load_configuration(config).home
     with direct_transaction(records_folder(home)) as connection:
         append_audit(connection, AuditEntry(by, _ROLE, "token.removed", f"token {name}"))
-        ApiTokens(home / "hmi").remove(name)
+        ApiTokens(home / FOLDER).remove(name)
 
 
 def _time(utc_ms: int) -> str:

@@ -7,7 +7,11 @@ define(
     "people.first_text",
     "Nobody can log in yet. Choose the administrator and a PIN that only this person knows. There is no other access.",
 )
-define("people.only_here", "The administrator's PIN can be chosen only at the station's own screen.")
+define(
+    "people.only_here",
+    "The administrator's PIN can be chosen only at the station's own screen, or on its machine by the command"
+    " 'station administrator'.",
+)
 define("people.begun", "An administrator was already chosen. Log in.")
 define("people.broken", "The file of people cannot be read: {detail}")
 define("people.broken_title", "Nobody can log in")

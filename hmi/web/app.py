@@ -29,7 +29,7 @@ from hmi.web.render import Renderer
 from hmi.web.security import SecurityMiddleware
 from hmi.web.sessions import Sessions
 from hmi.web.streams import MOST_STREAMS, RESERVED_STREAMS
-from hmi.web.user_store import UserStore
+from hmi.web.user_store import FOLDER, UserStore
 from station.channel.messages import ChannelError, DeadlineError
 from station.channel.panel_live import PersonNoted
 from station.errors import StationError
@@ -38,7 +38,6 @@ from station.serving.places import Places
 from station.settings.configuration import Configuration
 from station.settings.hmi import panel_endpoint
 
-FOLDER = "hmi"
 _SWEEP_S = 1.0
 
 log = logging.getLogger(__name__)

@@ -15,6 +15,8 @@ from hmi.web.roles import Role
 from station.atomic_file import write_atomically
 from station.errors import StationError
 
+FOLDER = "hmi"
+"""The pages' own within the home folder."""
 FILE_NAME = "people.json"
 MOST_PEOPLE = 200
 LONGEST_PIN = 12
@@ -75,7 +77,9 @@ class UserStore:
 
     @property
     def first_start(self) -> bool:
-        """True until somebody has set the first administrator's PIN."""
+        """True until somebody has set the first administrator's PIN, here or by `station administrator`."""
+        if not self._people and not self.broken:
+            self._people = self._read()
         return not self._people and not self.broken
 
     def names(self) -> Mapping[str, Role]:

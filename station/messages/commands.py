@@ -8,6 +8,11 @@ MODE_UNKNOWN = define(
 MODE_KEPT = define(
     "command.mode_kept", "{activity} at the panel needs this mode: let it end, or call it off there", activity=Nested()
 )
+MODE_NOT_STORED = define(
+    "command.mode_not_stored",
+    "mode {mode} is set, but is lost at the next start: the home folder cannot be written; make it writable",
+    mode=Number(),
+)
 JOGGING = define("command.jogging", "jogging")
 RECIPE_UNKNOWN = define("command.recipe_unknown", "recipe {number}: expected one of {known}")
 NO_RECIPES = define("command.no_recipes", "recipe {number}: there is no recipe to choose; see `station recipes check`")

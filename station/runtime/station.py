@@ -118,7 +118,7 @@ class Station:
         await asyncio.to_thread(lots.restore)
         audit.log(*start_entries(self.boot, configuration, kept, versions, self._broken))
         orders = PlcCommands(service, devices, book, lots, kept, observability)
-        orders.restore_stop()
+        orders.restore()
         interlock = Interlock(service, devices, orders, book, lots, observability)
         production = Production(service, devices, book, lots, orders, interlock)
         alarm_orders = AlarmCommands(alarms, audit)

@@ -62,8 +62,8 @@ class Gauge:
     """The interaction was pooled with the equipment's variation."""
     components: tuple[Component, ...]
     """Named EV, AV, INT (if not pooled), GRR, PV and TV."""
-    distinct_categories: int
-    """ndc; at least 5 are required."""
+    distinct_categories: int | None
+    """ndc; at least 5 are required. None if parts differ and nothing else does: it has no limit."""
     tolerance: float | None
 
     def component(self, name: str) -> Component:
@@ -115,8 +115,8 @@ def analyse(values: npt.ArrayLike, tolerance: float | None = None) -> Gauge:
         )
         for name in shown
     )
-    grr = sqrt(variances["GRR"])
-    categories = int(1.41 * sqrt(variances["PV"]) / grr) if grr else 0
+    grr, between = sqrt(variances["GRR"]), sqrt(variances["PV"])
+    categories = int(1.41 * between / grr) if grr else None if between else 0
     return Gauge(sources, pooled, components, categories, tolerance)
 
 

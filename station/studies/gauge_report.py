@@ -28,8 +28,9 @@ def aiag_class(gauge: Gauge) -> tuple[str, str]:
         else (grr.tolerance_percent, "the tolerance")
     )
     judged = "acceptable" if percent <= GOOD else "to be weighed" if percent <= BEARABLE else "not acceptable"
-    enough = "enough" if gauge.distinct_categories >= LEAST_CATEGORIES else f"at least {LEAST_CATEGORIES} are required"
-    categories = f"{gauge.distinct_categories} distinct categories ({enough})"
+    found = gauge.distinct_categories
+    enough = "enough" if found is None or found >= LEAST_CATEGORIES else f"at least {LEAST_CATEGORIES} are required"
+    categories = f"{'any number of' if found is None else found} distinct categories ({enough})"
     style = "good" if percent <= GOOD else "" if percent <= BEARABLE else "bad"
     return style, f"GRR is {percent:.1f} % of {of}: {judged}; {categories}."
 

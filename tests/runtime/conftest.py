@@ -37,7 +37,7 @@ from station.channel.line import (
 from station.devices.gripper import robotiq
 from station.inspection.states import State
 from station.messages.message import verbatim
-from station.runtime.rpc.maintenance import MANUAL
+from station.runtime.production.plc_commands import MANUAL
 from station.runtime.station import Station
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.hmi import panel_endpoint

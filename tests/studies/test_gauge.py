@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from station.errors import BadInputError
 from station.studies.agreement import agreement, cohen_kappa
 from station.studies.gauge import analyse
+from station.studies.gauge_report import aiag_class
 from station.studies.gauge_table import Measurement, crossed, read_measurements, written
 
 # Ten parts, three appraisers, three trials: the worked example of AIAG's MSA (4th edition, chapter III, section B).
@@ -139,6 +140,16 @@ def test_a_gauge_that_always_says_the_same_has_no_categories(area):
     assert all((source.f, source.p) == (None, None) for source in gauge.sources)
     assert gauge.component("TV").sigma == 0
     assert gauge.distinct_categories == 0
+
+
+def test_a_gauge_without_any_variation_of_its_own_tells_any_number_of_parts_apart():
+    parts = np.array([9.1, 10.3, 12.7, 14.9, 10.1])
+    gauge = analyse(np.broadcast_to(parts[:, None, None], (5, 3, 2)), tolerance=10.0)
+    assert gauge.component("GRR").sigma == 0
+    assert gauge.distinct_categories is None
+    assert aiag_class(gauge) == (
+        "good", "GRR is 0.0 % of the tolerance: acceptable; any number of distinct categories (enough)."
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("values", [np.zeros((1, 2, 2)), np.zeros((2, 2, 1)), np.full((2, 2, 2), np.nan), np.zeros(8)])

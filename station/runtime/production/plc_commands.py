@@ -31,14 +31,15 @@ DEADLINE_S = 25.0
 """Less than the PLC interface's own deadline for a command."""
 LINE_SILENT_S = 2.0
 STOP_WITHIN_S = 0.5
-PRODUCTION = 1
-MODES = (PRODUCTION, 2, 3)
-_STOPPED = "stopped_by_a_person"
+PRODUCTION, MAINTENANCE, MANUAL = 1, 2, 3
+"""PackML's unit modes; in manual mode a person moves things by hand."""
+MODES = (PRODUCTION, MAINTENANCE, MANUAL)
+_STOPPED, _MODE = "stopped_by_a_person", "mode"
 _ON_ALARMS: dict[CommandName, AlarmChange] = {CommandName.CLEAR_ALARMS: "acknowledged", CommandName.RESET: "reset"}
 
 
 class PlcCommands:
-    """Executes the PLC's commands, one after the other; the state files store a person's stop for a restart."""
+    """Executes the PLC's commands, one after the other; the state files store stop and mode for a restart."""
 
     def __init__(
         self,
@@ -53,7 +54,6 @@ class PlcCommands:
         self._lots, self._state_files = lots, state_files
         self._metrics, self._audit = observability.metrics, observability.audit
         self.mode = PRODUCTION
-        """PackML's: 1 production, 2 maintenance, 3 manual."""
         self.recipe_changing = False
         self.registers_wanted = False
         """The PLC interface's registers are wanted with its next beat."""
@@ -76,11 +76,16 @@ class PlcCommands:
         """Request the PLC interface's registers with its next beat."""
         self.registers_wanted = True
 
-    def restore_stop(self) -> None:
-        """Restore a person's stop after a restart; it lasts until a reset."""
+    def restore(self) -> None:
+        """Restore after a restart a person's stop, which lasts until a reset, and the mode."""
         if self._state_files.read(_STOPPED) == b"yes":
             self._stop_wanted = True
             self._service.stop()
+        stored = self._state_files.read(_MODE)
+        if stored is not None:
+            # Somebody may reach into the cell of a station whose file says neither the one nor the other.
+            self.mode = next((mode for mode in MODES if stored == b"%d" % mode), MANUAL)
+            self._service.set_mode(production=self.mode == PRODUCTION)
 
     async def _store_stop(self) -> bool:
         """Make it durable whether a person's stop is wanted; the last order's is what the file has at the end."""
@@ -161,12 +166,12 @@ class PlcCommands:
             case CommandName.CALL_OFF:
                 return await self._call_off()
             case CommandName.SET_MODE:
-                return self._set_mode(command.argument)
+                return await self._set_mode(command.argument)
             case CommandName.CLEAR_ALARMS:
                 self._service.alarms.acknowledge_returned()
                 return None
 
-    def _set_mode(self, mode: int) -> Message | None:
+    async def _set_mode(self, mode: int) -> Message | None:
         if mode not in MODES:
             return messages.MODE_UNKNOWN(mode=mode)
         activity = self._service.manual_activity
@@ -174,7 +179,8 @@ class PlcCommands:
             return messages.MODE_KEPT(activity=activity)
         self.mode = mode
         self._service.set_mode(production=mode == PRODUCTION)
-        return None
+        stored = await asyncio.to_thread(self._state_files.write, _MODE, b"%d" % mode)
+        return None if stored else messages.MODE_NOT_STORED(mode=mode)
 
     async def _change_recipe(self, number: int) -> Message | None:
         await asyncio.to_thread(self._recipes.read)

@@ -36,6 +36,7 @@ from station.records.audit import AuditEntry
 from station.runtime.devices.manager import GRIPPER
 from station.runtime.imaging.golden_reference import GOLDEN
 from station.runtime.observability.observability import Observability
+from station.runtime.production.plc_commands import MANUAL
 from station.runtime.production.production import Production
 from station.runtime.rpc.log import LogRing
 from station.settings.segmentation import Segmentation
@@ -44,8 +45,6 @@ from station.vision.image_quality import sharpness
 from station.vision.methods import make_method
 from station.vocabulary import Refusal
 
-MANUAL = 3
-"""PackML's unit mode in which a person moves things by hand."""
 JOG_SPEED_MM_S, JOG_FORCE_N = 20.0, 20.0
 """The gripper's slowest and weakest."""
 FRAME_DEADLINE_S = 2.0

@@ -13,7 +13,7 @@ from station.messages.calibration import A_CALIBRATION, STEP_PRESS
 from station.messages.commands import JOGGING
 from station.messages.maintenance import UNDER_WAY
 from station.runtime.devices.manager import CAMERA, GRIPPER
-from station.runtime.rpc.maintenance import MANUAL
+from station.runtime.production.plc_commands import MANUAL
 from station.runtime.state_files import StateFiles
 from tests.runtime.ball import MAX, end_run, run_now, start_run, stop, until_waits
 

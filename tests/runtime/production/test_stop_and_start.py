@@ -60,8 +60,8 @@ def test_a_start_after_a_stop_is_no_second_press_of_the_start_before_it(bench):
 
 @pytest.mark.timeout(240)
 def test_a_start_right_after_a_stop_starts_a_station_that_the_stop_has_yet_to_reach(bench, monkeypatch):
-    made, restore = [], PlcCommands.restore_stop
-    monkeypatch.setattr(PlcCommands, "restore_stop", lambda self: made.append(self) or restore(self))
+    made, restore = [], PlcCommands.restore
+    monkeypatch.setattr(PlcCommands, "restore", lambda self: made.append(self) or restore(self))
 
     async def scenario():
         async with bench() as cell:
