@@ -6,8 +6,10 @@ import pytest
 
 from station.channel.line import CommandName
 from station.inspection.states import State
-from station.messages import commands, readiness
+from station.messages import commands
 from station.runtime.cycle.service import Service
+from station.runtime.devices.manager import GRIPPER
+from station.runtime.production.housekeeping import Housekeeping
 from station.runtime.production.plc_commands import MANUAL, PRODUCTION
 from station.runtime.state_files import StateFiles
 
@@ -26,27 +28,35 @@ def entered(monkeypatch):
 
 
 @pytest.mark.timeout(240)
-def test_a_station_killed_in_manual_mode_moves_nothing_until_a_person_resets_it(bench, settings_file, entered):
-    file = settings_file(bench=False)
+def test_a_station_killed_in_manual_mode_moves_nothing_until_a_person_resets_it(
+    bench, settings_file, entered, monkeypatch
+):
+    file, rounds, recover = settings_file(bench=False), list[list[str]](), Housekeeping._try_recovery
+
+    async def counted(self):
+        await recover(self)
+        rounds.append(list(self._devices.faults))
+
+    monkeypatch.setattr(Housekeeping, "_try_recovery", counted)
 
     async def scenario():
         async with bench(file) as cell:
-            await cell.reach(State.IDLE)
+            await cell.until(lambda: cell.phase is State.IDLE, patience_s=150)
             assert (await cell.line.order(CommandName.SET_MODE, MANUAL)).done
         entered.clear()
+        rounds.clear()
         async with bench(file) as cell:
-            await cell.reach(State.STOPPED)
-            await cell.until(lambda: not cell.station.service._devices.faults)
-            await cell.station.service.runner.taken()
-            assert State.IDLE not in entered
-            assert entered[-1] is State.STOPPED
-            assert (await cell.line.state()).why_not_ready == readiness.NOT_PRODUCTION()
+            # A gripper that is not activated, and nothing else: in production its jaws would open at once.
+            await cell.until(lambda: rounds.count([GRIPPER]) > 3, patience_s=150)
+            assert rounds[-1] == [GRIPPER]
+            assert set(entered) <= {State.UNKNOWN, State.HELD}
+            assert (await cell.line.state()).mode == MANUAL
             assert (await cell.line.order(CommandName.SET_MODE, PRODUCTION)).done
             done = await cell.line.order(CommandName.RESET)
             assert done.done, done.why
             assert cell.phase is State.IDLE
         async with bench(file) as cell:
-            await cell.reach(State.IDLE)
+            await cell.until(lambda: cell.phase is State.IDLE, patience_s=150)
 
     asyncio.run(scenario())
 
