@@ -100,7 +100,8 @@ class UrRtdeProcess:
             runtime_state=receive.getRuntimeState(),
             commanding=self._control is not None,
             underway=progress is not None and progress.isAsyncOperationRunning(),
-            kicks_late=self._kicks_late,
+            # Now, not by the last look: it is some time after the stop that the state shows.
+            kicks_late=self._kicks_late or self._late(),
         )
 
     async def move(self, request: Move) -> Outcome:
@@ -158,26 +159,38 @@ class UrRtdeProcess:
         """Kick the controller's watchdog as long as the health lease runs."""
         while True:
             await asyncio.sleep(period_s)
-            control, playing = self._control, self._playing()
-            if control is None:
+            if self._control is None:
                 continue
+            playing = self._playing()
             if self._played:  # a program that was not kicked in time and plays on was not stopped by that
-                late = time.monotonic() - self._kicked_s > KICKS_PER_LIMIT * period_s
-                self._kicks_late = late or (self._kicks_late and not playing)
+                self._kicks_late = self._late() or (self._kicks_late and not playing)
             self._played = playing
             if playing and time.monotonic() < self._healthy_until_s:
-                await self._on_arm(control.kickWatchdog)
-                self._kicked_s = time.monotonic()
+                await self._on_arm(self._kick_watchdog)
+
+    def _kick_watchdog(self) -> bool:
+        begun_s = time.monotonic()
+        taken = self._commanding().kickWatchdog()
+        self._kicked_s = begun_s
+        return taken
+
+    def _late(self) -> bool:
+        """Whether the watchdog may have stopped a program that was playing at the last look.
+
+        The limit counts from a kick's begin, which the controller cannot have received before: so whatever it stops,
+        however long this process was kept from the processor meanwhile, was late.
+        """
+        return self._played and time.monotonic() - self._kicked_s > 1.0 / self._set_up.watchdog_hz
 
     def _prepare(self) -> bool:
-        control, wanted = self._commanding(), self._set_up
+        control, wanted, begun_s = self._commanding(), self._set_up, time.monotonic()
         centre_m = [value / 1000 for value in wanted.payload_centre_mm]
         prepared = (
             control.setTcp(self._tool())
             and control.setPayload(wanted.payload_kg, centre_m)
             and control.setWatchdog(wanted.watchdog_hz)
         )
-        self._kicked_s, self._kicks_late, self._played = time.monotonic(), False, True
+        self._kicked_s, self._kicks_late, self._played = begun_s, False, True
         return prepared
 
     def _tool(self) -> list[float]:

@@ -2,7 +2,11 @@
 
 import asyncio
 import time
+from types import SimpleNamespace
 
+import pytest
+
+from station.devices.arm import process as process_module
 from station.devices.arm.diagnosis import PLAYING
 from station.devices.arm.messages import Beat, Command
 from station.devices.arm.process import UrRtdeProcess
@@ -15,7 +19,7 @@ class Controller:
     """Both of ur-rtde's connections, and a program that plays or does not."""
 
     def __init__(self):
-        self.state, self.kicks = PLAYING, 0
+        self.state, self.kicks, self.looks = PLAYING, 0, 0
 
     def kickWatchdog(self):  # noqa: N802 (ur-rtde's name)
         self.kicks += 1
@@ -34,6 +38,7 @@ class Controller:
         return True
 
     def getRuntimeState(self):  # noqa: N802
+        self.looks += 1
         return self.state
 
     def __getattr__(self, name):
@@ -44,13 +49,58 @@ class Controller:
         }.get(name, lambda: [0.0] * 6)
 
 
-def test_a_watchdog_left_without_a_kick_is_told_until_the_program_begins_again():
+@pytest.fixture
+def prepared():
+    """The process after its program was uploaded, and the controller."""
+    process, controller = UrRtdeProcess("nowhere", 125.0), Controller()
+    process._control = process._receive = controller
+    process._set_up = Command(
+        tool_centre_mm=(0, 0, 0), payload_kg=1, payload_centre_mm=(0, 0, 0), watchdog_hz=WATCHDOG_HZ
+    )
+    yield process, controller
+    process._commander.shutdown()
+
+
+def test_a_stop_by_the_watchdog_is_told_with_the_state_that_shows_it_also_after_a_kick_that_took_long(
+    prepared, monkeypatch
+):
+    """The controller counts from some moment of the kick, and its stop comes between two looks of this process."""
+    process, controller = prepared
+    now = SimpleNamespace(s=100.0)
+    monkeypatch.setattr(process_module, "time", SimpleNamespace(monotonic=lambda: now.s))
+
+    def kick():
+        now.s += 0.7 / WATCHDOG_HZ
+        controller.kicks += 1
+        return True
+
+    controller.kickWatchdog = kick
+
+    async def told_after(share):
+        """Whether kicks are late with a stop so long after the kick's begin, in shares of the watchdog's limit."""
+        controller.state, controller.kicks, controller.looks, now.s = PLAYING, 0, 0, now.s + 100.0
+        assert process._prepare()
+        process._healthy_until_s, begun_s = now.s + 0.5 / WATCHDOG_HZ, now.s
+        kicking = asyncio.create_task(process._kick(0.001))
+        while controller.looks < 2:
+            await asyncio.sleep(0)
+        kicking.cancel()
+        await asyncio.gather(kicking, return_exceptions=True)
+        assert controller.kicks == 1
+        now.s, controller.state = begun_s + share / WATCHDOG_HZ, PLAYING - 1
+        return (await process.beat(Beat(healthy_for_s=30.0))).kicks_late
+
     async def run():
-        process, controller = UrRtdeProcess("nowhere", 125.0), Controller()
-        process._control = process._receive = controller
-        process._set_up = Command(
-            tool_centre_mm=(0, 0, 0), payload_kg=1, payload_centre_mm=(0, 0, 0), watchdog_hz=WATCHDOG_HZ
-        )
+        assert await told_after(1.01)
+        assert not await told_after(0.9)
+
+    asyncio.run(run())
+
+
+def test_a_watchdog_left_without_a_kick_is_told_until_the_program_begins_again(prepared):
+    process, controller = prepared
+
+    async def run():
         assert process._prepare()
         kicking = asyncio.create_task(process._kick(PERIOD_S))
         try:
@@ -67,6 +117,5 @@ def test_a_watchdog_left_without_a_kick_is_told_until_the_program_begins_again()
         finally:
             kicking.cancel()
             await asyncio.gather(kicking, return_exceptions=True)
-            process._commander.shutdown()
 
     asyncio.run(run())
