@@ -100,7 +100,7 @@ class UrRtdeProcess:
             runtime_state=receive.getRuntimeState(),
             commanding=self._control is not None,
             underway=progress is not None and progress.isAsyncOperationRunning(),
-            # Now, not by the last look: it is some time after the stop that the state shows.
+            # Computed now: when the state was last read for it, the stop that the state shows may not have happened yet.
             kicks_late=self._kicks_late or self._late(),
         )
 
@@ -175,7 +175,7 @@ class UrRtdeProcess:
         return taken
 
     def _late(self) -> bool:
-        """Whether the watchdog may have stopped a program that was playing at the last look.
+        """Whether the watchdog may have stopped a program that was playing when last read.
 
         The limit counts from a kick's begin, which the controller cannot have received before: so whatever it stops,
         however long this process was kept from the processor meanwhile, was late.
