@@ -100,7 +100,7 @@ class UrRtdeProcess:
             runtime_state=receive.getRuntimeState(),
             commanding=self._control is not None,
             underway=progress is not None and progress.isAsyncOperationRunning(),
-            # Computed now: when the state was last read for it, the stop that the state shows may not have happened yet.
+            # Computed now: when the state was last read for it, the stop that is shown may not have happened yet.
             kicks_late=self._kicks_late or self._late(),
         )
 
