@@ -4,7 +4,13 @@ from typing import Any
 
 from station.channel.client import ChannelClient
 from station.channel.panel import Actor
-from station.channel.panel_live import OperatorCommand, OperatorCommandName, OperatorCommandView
+from station.channel.panel_live import (
+    GetPanelState,
+    OperatorCommand,
+    OperatorCommandName,
+    OperatorCommandView,
+    PanelState,
+)
 from station.channel.panel_maintenance_queries import (
     CalibrationRunView,
     CalibrationState,
@@ -12,6 +18,7 @@ from station.channel.panel_maintenance_queries import (
     GetCalibration,
     StartCalibrationRun,
 )
+from tests.runtime.conftest import eventually
 
 MAX = Actor(who="Max", role="maintenance")
 PLACES = ((-2.5, 0.0),)
@@ -21,9 +28,15 @@ PRESSED_S = 240.0
 
 
 async def stop(panel: ChannelClient) -> None:
-    """*Stop*."""
+    """*Stop*, to its end: the first answer may come before."""
     order = OperatorCommand(person=MAX, order=OperatorCommandName.STOP)
-    assert (await panel.request(order, OperatorCommandView, deadline_s=20)).state == "done"
+    given = await panel.request(order, OperatorCommandView, deadline_s=20)
+
+    async def ended() -> OperatorCommandView | None:
+        orders = (await panel.request(GetPanelState(), PanelState, deadline_s=20)).orders
+        return next((each for each in orders if each.ticket == given.ticket and each.state != "executing"), None)
+
+    assert (await eventually(ended)).state == "done"
 
 
 async def start_run(panel: ChannelClient, places: tuple[tuple[float, float], ...] = PLACES) -> None:
