@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from hmi.past.past import AuditRow
 from hmi.web.text import texts
 from hmi.web.translation import NO_VALUE, Locale
-from station.messages import alarms
+from station.messages import alarms, calibration
 from station.messages.alarms import AlarmTexts
 
 _MOST_DETAILS = 6
@@ -16,6 +16,7 @@ _REVISION = re.compile(r"(\S+) revision (\d+)")
 _LONGEST_VALUE = 60
 _NO_DETAILS = frozenset({"argument", "done", "why", "text", "sha256", "configuration_sha256", "boot", "file", "status"})
 """Values that the sentence states, or that only a program compares."""
+_BALL_RUNS = {"calibration": calibration.A_CALIBRATION, "verification": calibration.A_VERIFICATION}
 _ALARMS = {name.lower(): value for name, value in vars(alarms).items() if isinstance(value, AlarmTexts)}
 
 
@@ -52,6 +53,8 @@ def _subject(row: AuditRow, locale: Locale) -> str:
     kind, _, rest = row.subject.partition(" ")
     if kind == "alarm" and (known := _ALARMS.get(rest)):
         return locale.sentence(known.cause())
+    if row.action.startswith("calibration.") and row.subject in _BALL_RUNS:
+        return locale.sentence(_BALL_RUNS[row.subject]())
     if kind == "recipe" and (revision := _REVISION.fullmatch(rest)):
         return locale.text("audit.recipe_revision", name=revision[1], n=revision[2])
     return rest if kind in {"recipe", "lot"} and rest else row.subject

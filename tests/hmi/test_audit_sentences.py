@@ -45,6 +45,13 @@ def test_an_alarm_has_its_own_name_in_the_readers_language():
     assert "Greifer" in sentence(row("alarm.shelved", "alarm gripper_link_lost"), {}, Locale("de")).what
 
 
+@pytest.mark.parametrize(("kind", "named"), [("calibration", "eine Kalibrierung"), ("verification", "eine Überprüfung")])
+def test_a_run_with_the_ball_is_named_in_the_readers_language(kind, named):
+    begun = sentence(row("calibration.begun", kind), {}, Locale("de")).what
+    assert named in begun
+    assert kind not in begun
+
+
 def test_a_changed_limit_is_shown_and_fingerprints_are_not():
     approved = row("recipe.approved", "recipe strawberry revision 2", old={"sha256": "ab", "revision": 1},
                    new={"sha256": "cd", "revision": 2, "changes": "area: 98 → 85"})  # fmt: skip
