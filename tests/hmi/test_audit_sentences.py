@@ -45,7 +45,9 @@ def test_an_alarm_has_its_own_name_in_the_readers_language():
     assert "Greifer" in sentence(row("alarm.shelved", "alarm gripper_link_lost"), {}, Locale("de")).what
 
 
-@pytest.mark.parametrize(("kind", "named"), [("calibration", "eine Kalibrierung"), ("verification", "eine Überprüfung")])
+@pytest.mark.parametrize(
+    ("kind", "named"), [("calibration", "eine Kalibrierung"), ("verification", "eine Überprüfung")]
+)
 def test_a_run_with_the_ball_is_named_in_the_readers_language(kind, named):
     begun = sentence(row("calibration.begun", kind), {}, Locale("de")).what
     assert named in begun
