@@ -15,7 +15,10 @@ NO_RECIPE = define("readiness.no_recipe", "No recipe is active: choose one by it
 NO_RECIPE_AT_ALL = define(
     "readiness.no_recipe_at_all", "No recipe is active, and there is none to choose: see `station recipes check`."
 )
-NOT_PRODUCTION = define("readiness.not_production", "The station is not in production mode: set mode 1.")
+NOT_PRODUCTION = define(
+    "readiness.not_production",
+    "The station is not in production mode: set it on the page Maintenance, or mode 1 from the PLC.",
+)
 SEE_DEVICES = define("readiness.see_devices", "see the detail, and `station devices check`")
 SEE_DETAIL = define("readiness.see_detail", "see the detail")
 PLC_NOT_HEARD = define("readiness.plc_not_heard", "the PLC interface has sent nothing yet")
