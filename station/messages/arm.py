@@ -148,6 +148,7 @@ RECOVERY_PROTECTIVE_STOP = define("arm.recovery_protective_stop", "leaving the p
 RECOVERY_POWER = define("arm.recovery_power", "powering on")
 RECOVERY_UPLOAD = define("arm.recovery_upload", "uploading the program")
 
+REQUEST_START = define("arm.request_start", "start")
 REQUEST_WATCH = define("arm.request_watch", "receive the controller's state")
 REQUEST_COMMAND = define("arm.request_command", "start the control program")
 REQUEST_UPLOAD = define("arm.request_upload", "upload the control program again")

@@ -14,7 +14,19 @@ from typing import NoReturn
 from station.devices.arm.dashboard import dashboard
 from station.devices.arm.diagnosis import PLAYING, STATE_CAUSES, diagnose, from_output, from_state
 from station.devices.arm.faults import ArmCause, ArmFault
-from station.devices.arm.messages import Beat, Beside, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
+from station.devices.arm.messages import (
+    Beat,
+    Beside,
+    Command,
+    Halt,
+    Move,
+    Outcome,
+    Reachable,
+    Snapshot,
+    Start,
+    Upload,
+    Watch,
+)
 from station.devices.arm.process_handle import ArmProcess
 from station.messages import arm as messages
 from station.messages.message import Message
@@ -27,6 +39,8 @@ LONGEST_PAUSE_S = 3.0
 UPLOAD_TRIES = 3
 SETTLE_S = 0.5
 FIRST_LEASE_S = 2.0
+PROCESS_START_LIMIT_S = 60.0
+"""As the supervisor gives each of the station's processes."""
 SELF_HEALING = {ArmCause.LINK_LOST, ArmCause.STALE, ArmCause.DEADLINE}
 
 log = logging.getLogger(__name__)
@@ -275,6 +289,8 @@ class ArmLink:
         async with dashboard(self._settings.host):
             pass  # check that a controller answers before a process is started for it
         self._process = await ArmProcess.spawn(self._settings.host, self._settings.frequency_hz)
+        # Apart from the constructors' limit: a busy machine may take longer to import the libraries than to connect.
+        await self._process.request(Start(), Outcome, deadline_s=PROCESS_START_LIMIT_S)
         outcome = await self._process.request(Watch(), Outcome, deadline_s=self._settings.constructor_limit_s)
         if not outcome.done:
             raise from_output(outcome.output) or ArmFault(

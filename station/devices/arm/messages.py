@@ -17,6 +17,12 @@ class ArmRequest(ChannelMessage):
     """The request as a person reads it in a fault."""
 
 
+class Start(ArmRequest):
+    """Answer once the process has started."""
+
+    meaning: ClassVar[Message] = messages.REQUEST_START()
+
+
 class Watch(ArmRequest):
     """Connect to receive the controller's state."""
 

@@ -20,7 +20,19 @@ from rtde_receive import RTDEReceiveInterface
 from station.channel.server import ChannelServer
 from station.devices.arm.age import TimestampAge
 from station.devices.arm.diagnosis import PLAYING
-from station.devices.arm.messages import Beat, Beside, Command, Halt, Move, Outcome, Reachable, Snapshot, Upload, Watch
+from station.devices.arm.messages import (
+    Beat,
+    Beside,
+    Command,
+    Halt,
+    Move,
+    Outcome,
+    Reachable,
+    Snapshot,
+    Start,
+    Upload,
+    Watch,
+)
 from station.devices.arm.offset import offset_pose
 from station.errors import StationError
 from station.messages import arm as messages
@@ -57,6 +69,10 @@ class UrRtdeProcess:
         self._kicking: asyncio.Task[None] | None = None
         self._kicked_s = 0.0
         self._kicks_late = self._played = False
+
+    async def start(self, _request: Start) -> Outcome:
+        """Answer, which this process can once it runs."""
+        return Outcome(done=True)
 
     async def watch(self, _request: Watch) -> Outcome:
         """Open the receiving connection; this holds the interpreter's lock until it is open."""
@@ -243,6 +259,7 @@ async def serve(endpoint: str, host: str, frequency_hz: float) -> None:
     server = ChannelServer(
         endpoint,
         {
+            Start: process.start,
             Watch: process.watch,
             Command: process.command,
             Upload: process.upload,
