@@ -15,7 +15,7 @@ SCAN_S = 0.02
 
 
 def program_for(station_is_simulated):
-    """The shipped text; a busy machine's heartbeats and results come late, and the station of a test has no deadline."""
+    """The shipped text; heartbeats and results of a busy machine come late, and a test's station has no deadline."""
     text = example().replace("heartbeat_timeout := T#2s", "heartbeat_timeout := T#20s")
     text = text.replace("answer_timeout := T#2s", "answer_timeout := T#20s")
     text = text.replace("inspection_timeout := T#20s", "inspection_timeout := T#100s")
