@@ -10,8 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from station.inspection.evidence import Evidence
 from station.inspection.judge import early_stop, judge
 from station.inspection.press import Measured, Press
+from station.inspection.sized_limits import sized_limits
 from station.messages import judge as messages
 from station.messages.message import SENTENCES
 from station.settings.recipe import load_recipe
@@ -646,8 +648,8 @@ def test_an_earlier_limit_passes_no_fruit_whose_area_does_not_rise_up_to_the_las
     assert judge(Press(35.0, 0.4, points), EVERY_TRUSTED).outcome == outcome
 
 
-def by_both_limits(at_2: Measured, at_4: Measured, least_mm2: tuple[float, float] = (0.0, 0.0)) -> str:
-    """The outcome of a strawberry measured at both limits, 50 and 100 mm², and before."""
+def at_both_limits(at_2: Measured, at_4: Measured, least_mm2: tuple[float, float] = (0.0, 0.0)) -> tuple[Press, Recipe]:
+    """A strawberry measured at both limits, 50 and 100 mm², and before."""
     limits = tuple(
         limit.model_copy(update={"least_area_mm2": least})
         for limit, least in zip(EVERY_TRUSTED.damage.area, least_mm2, strict=True)
@@ -655,7 +657,12 @@ def by_both_limits(at_2: Measured, at_4: Measured, least_mm2: tuple[float, float
     recipe = EVERY_TRUSTED.model_copy(update={"damage": EVERY_TRUSTED.damage.model_copy(update={"area": limits})})
     between = point(3.0, (at_2.area_mm2 + at_4.area_mm2) / 2)
     points = (point(0.0, 2), point(1.0, at_2.area_mm2 / 2), at_2, between, at_4)
-    return judge(Press(35.0, 0.4, points), recipe).outcome
+    return Press(35.0, 0.4, points), recipe
+
+
+def by_both_limits(at_2: Measured, at_4: Measured, least_mm2: tuple[float, float] = (0.0, 0.0)) -> str:
+    """The outcome of such a strawberry."""
+    return judge(*at_both_limits(at_2, at_4, least_mm2)).outcome
 
 
 @pytest.mark.parametrize(
@@ -664,6 +671,7 @@ def by_both_limits(at_2: Measured, at_4: Measured, least_mm2: tuple[float, float
         ((Flag.LOW_CONFIDENCE,), "PASS"),
         ((Flag.CUT_BY_BORDER, Flag.LOW_CONFIDENCE), "PASS"),
         ((Flag.LOWER_BOUND,), "PASS"),
+        ((Flag.LOWER_BOUND, Flag.CUT_BY_BORDER, Flag.LOW_CONFIDENCE), "PASS"),
         ((Flag.SATURATED,), "NO_RESULT"),
         ((Flag.REFERENCE_MISMATCH, Flag.LOW_CONFIDENCE), "NO_RESULT"),
         ((Flag.UNDECIDED,), "NO_RESULT"),
@@ -680,26 +688,38 @@ def test_an_area_at_the_last_limit_that_is_no_fruits_is_not_judged_by_an_earlier
     assert by_both_limits(point(2.0, 30), point(4.0, 40, Flag.CUT_BY_BORDER), (20.0, 50.0)) == "NO_RESULT"
 
 
+def test_an_area_is_a_fruits_where_its_least_is_as_much_as_the_least_of_any_fruit():
+    at_2, at_4 = point(2.0, 30), point(4.0, 60, Flag.CUT_BY_BORDER)
+    press, recipe = at_both_limits(at_2, at_4)
+    found = Evidence(press, sized_limits(press, recipe)).area_at(4.0)
+    assert found is not None
+    area_mm2, uncertainty_mm2 = found
+    assert by_both_limits(at_2, at_4, (0.0, area_mm2 - uncertainty_mm2)) == "PASS"
+    assert by_both_limits(at_2, at_4, (0.0, area_mm2)) == "NO_RESULT"
+
+
 @pytest.mark.parametrize(
-    ("at_2_mm2", "flag", "outcome"),
+    ("at_2_mm2", "flags", "outcome"),
     [
-        (55, Flag.LOWER_BOUND, "NO_RESULT"),
-        (49, Flag.CUT_BY_BORDER, "NO_RESULT"),
-        (40, Flag.LOWER_BOUND, "PASS"),
-        (55, Flag.LOW_CONFIDENCE, "PASS"),  # it may as well be smaller
+        (55, (Flag.LOWER_BOUND,), "NO_RESULT"),
+        (49, (Flag.CUT_BY_BORDER,), "NO_RESULT"),
+        (49, (Flag.CUT_BY_BORDER, Flag.LOWER_BOUND), "NO_RESULT"),
+        (40, (Flag.LOWER_BOUND,), "PASS"),
+        (55, (Flag.LOW_CONFIDENCE,), "PASS"),  # it may as well be smaller
     ],
 )
 def test_a_cut_or_lost_edge_that_reaches_an_earlier_limit_keeps_the_fruit_from_passing_by_the_last(
-    at_2_mm2, flag, outcome
+    at_2_mm2, flags, outcome
 ):
-    assert by_both_limits(point(2.0, at_2_mm2, flag), point(4.0, 85)) == outcome
+    assert by_both_limits(point(2.0, at_2_mm2, *flags), point(4.0, 85)) == outcome
 
 
 @pytest.mark.parametrize("growth", [15, 48])
 def test_a_fruit_that_every_image_shows_touched_is_neither_passed_nor_failed(growth):
     verdict = judge(pressed(growth, onset_uncertainty_mm=None), STRAWBERRY)
     assert verdict.outcome == "NO_RESULT"
-    assert messages.TOUCHED_AT_FIRST(width_mm=35.0) in [finding.message for finding in verdict.findings]
+    [finding] = [each for each in verdict.findings if each.message == messages.TOUCHED_AT_FIRST(width_mm=35.0)]
+    assert (finding.reason, finding.value, finding.closing_mm) == (Reason.OUT_OF_RANGE, 35.0, 0.0)
 
 
 def test_a_recipe_says_when_not_every_limit_decides():
