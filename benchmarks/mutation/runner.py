@@ -111,9 +111,12 @@ def fates(todo: Sequence[Changed], tests: Sequence[str]) -> Iterator[tuple[Mutan
     """Yield each mutant with its fate, as they end.
 
     Raises:
-        SystemExit: the tests fail without any mutant.
+        SystemExit: the tests fail without any mutant, or this process has imported a module that is to be changed.
     """
-    order = _rehearse(tests, {each.mutant.module for each in todo})
+    mutated = {each.mutant.module for each in todo}
+    if imported := sorted(mutated & sys.modules.keys()):
+        raise SystemExit(f"{', '.join(imported)}: imported already, so no mutant would be met; one room a process")
+    order = _rehearse(tests, mutated)
     anew: list[Changed] = []
     for place, fate in _in_place(todo, tests, order):
         if fate is None:
@@ -244,6 +247,7 @@ def _put_in_place(module: CodeType, path: Path) -> bool:
         Whether one differs: a default value is no part of a function's code.
     """
     differs = False
+    gc.unfreeze()  # the tests' own conftest freezes what was collected, which hides it from `get_objects`
     codes = {(code.co_qualname, code.co_firstlineno): code for code in _codes(module)}
     for each in gc.get_objects():
         if isinstance(each, FunctionType) and each.__code__.co_filename == str(path):

@@ -1,6 +1,9 @@
 """The mutants of the pure rooms: which changes are made, and what the page says of their fates."""
 
 import ast
+import gc
+import json
+import types
 from pathlib import Path
 
 import pytest
@@ -9,6 +12,7 @@ from benchmarks.mutation.document import page
 from benchmarks.mutation.operators import mutants
 from benchmarks.mutation.results import Outcome, equal
 from benchmarks.mutation.rooms import ROOMS
+from benchmarks.mutation.runner import Changed, _put_in_place, fates
 
 ROOT = Path(__file__).resolve().parents[2]
 CODE = '''
@@ -68,3 +72,23 @@ def test_what_is_listed_as_equal_is_a_mutant_of_the_code_as_it_is():
         for mutant in mutants(module, ast.parse((ROOT / f"{module.replace('.', '/')}.py").read_text(encoding="utf-8")))
     }
     assert set(equal()) <= known
+
+
+def test_a_function_gets_its_changed_code_also_where_the_collector_was_told_to_leave_it_out(tmp_path):
+    file = tmp_path / "m.py"
+    file.write_text(CODE)
+    module = types.ModuleType("m")
+    exec(compile(CODE, str(file), "exec"), module.__dict__)
+    gc.freeze()
+    try:
+        changed = compile(CODE.replace("value <= high", "value < high"), str(file), "exec")
+        assert _put_in_place(changed, file)
+    finally:
+        gc.unfreeze()
+    assert not module.within(1, 1)
+
+
+def test_a_module_that_is_imported_already_is_refused_since_no_test_would_meet_its_mutants():
+    [mutant, *_] = mutants(json.__name__, ast.parse(CODE))
+    with pytest.raises(SystemExit, match="json: imported already"):
+        next(fates([Changed(mutant, Path(json.__file__), ast.parse(CODE))], []))
