@@ -703,7 +703,6 @@ def test_an_area_is_a_fruits_where_its_least_is_as_much_as_the_least_of_any_frui
     [
         (55, (Flag.LOWER_BOUND,), "NO_RESULT"),
         (49, (Flag.CUT_BY_BORDER,), "NO_RESULT"),
-        (49, (Flag.CUT_BY_BORDER, Flag.LOWER_BOUND), "NO_RESULT"),
         (40, (Flag.LOWER_BOUND,), "PASS"),
         (55, (Flag.LOW_CONFIDENCE,), "PASS"),  # it may as well be smaller
     ],
@@ -712,6 +711,16 @@ def test_a_cut_or_lost_edge_that_reaches_an_earlier_limit_keeps_the_fruit_from_p
     at_2_mm2, flags, outcome
 ):
     assert by_both_limits(point(2.0, at_2_mm2, *flags), point(4.0, 85)) == outcome
+
+
+@pytest.mark.parametrize(("limit_mm2", "outcome"), [(90, "PASS"), (62, "NO_RESULT")])
+def test_a_cut_and_lost_edge_that_reaches_its_limit_is_not_passed_by_the_limit_before_it(limit_mm2, outcome):
+    press, recipe = at_both_limits(point(2.0, 35), point(4.0, 85))
+    first, last = recipe.damage.area
+    between = last.model_copy(update={"closing_mm": 3.0, "area_mm2": limit_mm2})
+    three = recipe.damage.model_copy(update={"area": (first, between, last)})
+    cut_and_lost = spoilt(press, 3.0, Flag.CUT_BY_BORDER, Flag.LOWER_BOUND)
+    assert judge(cut_and_lost, recipe.model_copy(update={"damage": three})).outcome == outcome
 
 
 @pytest.mark.parametrize("growth", [15, 48])
