@@ -5,7 +5,7 @@ import pytest
 from plc_interface.handshake import actions as do
 from plc_interface.handshake import events as ev
 from plc_interface.handshake.journal import Journal
-from plc_interface.handshake.modes import Inspection
+from plc_interface.handshake.modes import Inspection, Link
 from station.channel.line import BeginReply, Open, Reason, Refusal
 
 
@@ -140,3 +140,20 @@ def test_a_request_that_fails_with_each_beat_is_logged_once(bench):
     made.feed(ev.OpenAnswered, made.state.open_request, Open(running=None, outcomes=()))
     made.feed(ev.RequestFailed, "no answer")
     assert "no answer" in made.of(do.Log)[-1].text
+
+
+def test_a_question_for_what_is_open_that_failed_is_put_again_at_the_next_beat(bench):
+    made = bench()
+    made.feed(ev.Beat, made.station_state())
+    asked = made.state.open_request
+    made.feed(ev.RequestFailed, "it gave no answer")
+    made.link()
+    assert [request.number for request in made.of(do.RequestOpen)] == [asked, asked + 1]
+    assert made.state.link is Link.UP
+
+
+def test_a_hidden_sequence_however_high_is_acknowledged_where_nothing_waits(bench):
+    hidden = 2**31
+    made = bench(Journal(highest=hidden, acknowledged=hidden - 1, hidden=(hidden,)))
+    made.link()
+    assert (made.state.journal.acknowledged, made.state.journal.hidden) == (hidden, ())
