@@ -639,3 +639,29 @@ def test_a_recipe_survives_being_kept_beside_a_result(small, write):
 def test_a_copied_folder_is_as_good_as_the_shipped_one(root, tmp_path):
     shutil.copytree(root / "recipes", tmp_path / "site")
     assert load_recipes(tmp_path / "site") == load_recipes()
+
+
+@pytest.mark.parametrize(
+    ("step_mm", "number", "closing_mm", "below_mm"),
+    [
+        (0.5, 8, 1.0, None),  # at the light touch's end
+        (1.0 - 0.22, 8, 1.0, 0.78),  # as near to the closing as makes it one at it
+        (0.1, 5, 1.0, None),  # the last step
+        (0.1, 4, 1.0, 0.78),
+        (1.4, 8, 3.0, 2.78),  # a light touch, and one beyond
+        (1.4, 8, 2.8234567, 2.603457),
+    ],
+)
+def test_a_limit_is_judged_on_one_step_unless_another_is_between_a_light_touch_and_its_closing(
+    step_mm, number, closing_mm, below_mm
+):
+    recipe = load_recipes()["blueberry"]
+    limit = recipe.damage.area[0].model_copy(update={"closing_mm": closing_mm})
+    changed = recipe.model_copy(
+        update={
+            "steps": recipe.steps.model_copy(update={"step_mm": step_mm, "number": number}),
+            "damage": recipe.damage.model_copy(update={"area": (limit,), "decided_by": "every_limit"}),
+        }
+    )
+    found = [message.parameters["below_mm"] for _, message in changed._judged_on_one_step()]
+    assert found == ([] if below_mm is None else [pytest.approx(below_mm, abs=1e-9)])
