@@ -65,7 +65,8 @@ class PlcCommands:
         self._turn = asyncio.Lock()
         self._stop_wanted = False
         """By the last order of a person, also before its file has it."""
-        self._stop_file = asyncio.Lock()
+        self._stop_file, self._mode_file = asyncio.Lock(), asyncio.Lock()
+        self._storing_mode: asyncio.Task[bool] | None = None
 
     @property
     def line_age_s(self) -> float | None:
@@ -179,8 +180,14 @@ class PlcCommands:
             return messages.MODE_KEPT(activity=activity)
         self.mode = mode
         self._service.set_mode(production=mode == PRODUCTION)
-        stored = await asyncio.to_thread(self._state_files.write, _MODE, b"%d" % mode)
-        return None if stored else messages.MODE_NOT_STORED(mode=mode)
+        # A write that outlasts its order is not left behind, or it could replace the next order's.
+        self._storing_mode = asyncio.create_task(self._store_mode())
+        return None if await asyncio.shield(self._storing_mode) else messages.MODE_NOT_STORED(mode=mode)
+
+    async def _store_mode(self) -> bool:
+        """Make the mode durable; the last order's is what the file has at the end."""
+        async with self._mode_file:
+            return await asyncio.to_thread(self._state_files.write, _MODE, b"%d" % self.mode)
 
     async def _change_recipe(self, number: int) -> Message | None:
         await asyncio.to_thread(self._recipes.read)

@@ -1,6 +1,7 @@
 """The mode over a restart: in another than production nothing moves by itself, also in a station that starts anew."""
 
 import asyncio
+import threading
 
 import pytest
 
@@ -9,6 +10,7 @@ from station.inspection.states import State
 from station.messages import commands
 from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import GRIPPER
+from station.runtime.production import plc_commands
 from station.runtime.production.housekeeping import Housekeeping
 from station.runtime.production.plc_commands import MANUAL, PRODUCTION
 from station.runtime.state_files import StateFiles
@@ -71,6 +73,39 @@ def test_a_mode_that_nobody_can_read_is_manual(bench, settings_file, tmp_path, s
     async def scenario():
         async with bench(file) as cell:
             assert (await cell.line.state()).mode == mode
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_the_last_mode_is_what_the_file_has_also_where_the_disk_outlasts_the_order_before(bench, monkeypatch):
+    begun, free, ended, write = threading.Event(), threading.Event(), threading.Event(), StateFiles.write
+
+    def slow_once(self, name, data):
+        if begun.is_set():
+            return write(self, name, data)
+        begun.set()
+        assert free.wait(60)
+        written = write(self, name, data)
+        ended.set()
+        return written
+
+    async def scenario():
+        async with bench() as cell:
+            home = cell.configuration.home
+            assert (await cell.line.order(CommandName.SET_MODE, MANUAL)).done
+            monkeypatch.setattr(StateFiles, "write", slow_once)
+            monkeypatch.setattr(plc_commands, "DEADLINE_S", 0.3)
+            assert not (await cell.line.order(CommandName.SET_MODE, PRODUCTION)).done
+            assert begun.is_set()
+            monkeypatch.setattr(plc_commands, "DEADLINE_S", 25.0)
+            manual = asyncio.create_task(cell.line.order(CommandName.SET_MODE, MANUAL))
+            await cell.until(lambda: not cell.station.service._in_production)
+            free.set()
+            done = await manual
+            assert done.done, done.why
+            assert await asyncio.to_thread(ended.wait, 60)
+            assert (home / "mode").read_text() == str(MANUAL)
 
     asyncio.run(scenario())
 
