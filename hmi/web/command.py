@@ -7,7 +7,8 @@ import click
 
 from hmi.web.process import serve
 from station.logs import configure_logging
-from station.settings.configuration import configuration_file, load_configuration
+from station.settings.configuration import configuration_file
+from station.settings.last_good import load_or_last_good
 
 
 @click.command("hmi")
@@ -19,4 +20,5 @@ def hmi(config: Path | None) -> None:
     themselves.
     """
     configure_logging("hmi")
-    asyncio.run(serve(load_configuration(config), configuration_file(config)))
+    site, _ = load_or_last_good(config)
+    asyncio.run(serve(site, configuration_file(config)))

@@ -10,7 +10,7 @@ from plc_interface.process.process import serve
 from plc_interface.registers.generate.files import DOCUMENTS, drifted_files, write_files
 from station.errors import StationError
 from station.logs import configure_logging
-from station.settings.configuration import load_configuration
+from station.settings.last_good import load_or_last_good
 
 
 @click.group("plc")
@@ -29,7 +29,8 @@ def run(config: Path | None) -> None:
     The station may start and stop meanwhile: while it does not answer, the PLC reads that and its triggers are refused.
     """
     configure_logging("plc")
-    asyncio.run(serve(load_configuration(config)))
+    site, _ = load_or_last_good(config)
+    asyncio.run(serve(site))
 
 
 @plc.command("docs")

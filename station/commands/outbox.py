@@ -15,6 +15,7 @@ from station.outbox.lag import LOST_S
 from station.outbox.publisher import destinations, run_outbox
 from station.outbox.status import outbox_folder, read_status
 from station.settings.configuration import Configuration, load_configuration
+from station.settings.last_good import load_or_last_good
 from station.supervision.notify import feed_watchdog, notify
 
 
@@ -31,7 +32,8 @@ def run(config: Path | None) -> None:
     It reads the records and never writes them; what cannot be published now is published later, in order.
     """
     configure_logging("outbox")
-    asyncio.run(_until_ended(load_configuration(config)))
+    site, _ = load_or_last_good(config)
+    asyncio.run(_until_ended(site))
 
 
 @outbox.command()

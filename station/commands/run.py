@@ -7,8 +7,9 @@ from pathlib import Path
 
 import click
 
-from station.settings.configuration import Configuration, load_configuration
+from station.settings.configuration import Configuration
 from station.settings.hmi import address_of
+from station.settings.last_good import load_or_last_good
 from station.supervision.notify import notify
 from station.supervision.programs import station_programs
 from station.supervision.supervisor import Supervisor
@@ -23,7 +24,7 @@ def run(config: Path | None) -> None:
     jaws open, and all processes end.
     """
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s")
-    site = load_configuration(config)
+    site, _ = load_or_last_good(config)
     asyncio.run(_supervise(site, config))
 
 

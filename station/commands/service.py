@@ -8,9 +8,9 @@ import click
 
 from station.logs import configure_logging
 from station.memory import keep_freed_memory
-from station.runtime.last_good import load_or_last_good
 from station.runtime.station import Station
 from station.settings.configuration import Configuration
+from station.settings.last_good import load_or_last_good
 
 
 @click.command("service")

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from station.runtime.last_good import load_or_last_good
 from station.runtime.recipes.active import ActiveRecipe, ActiveRecipes
 from station.runtime.state_files import StateFiles
+from station.settings.last_good import load_or_last_good
 from station.settings.problems import SettingsError
 
 

@@ -1,25 +1,28 @@
-"""Last good configuration: the station runs by it while its file is broken."""
+"""Last good configuration: the station's processes run by it while its file is broken."""
 
 import hashlib
+import logging
 import os
 from collections.abc import Mapping
 from pathlib import Path
 
 from pydantic import ValidationError
 
-from station.runtime.state_files import StateFiles
+from station.atomic_file import write_atomically
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.environment import CONFIG_VARIABLE, variable
 from station.settings.problems import SettingsError
 
 _FOLDER = "last_good"
 
+log = logging.getLogger(__name__)
+
 
 def load_or_last_good(file: Path | None, environ: Mapping[str, str] | None = None) -> tuple[Configuration, str]:
     """Read the configuration; if it is broken, return the last good one of the same file.
 
     A good configuration is stored in its home folder. A broken one does not name its home folder: the folder of the
-    environment, the file's folder and the default are searched.
+    environment, the file's folder and the default are searched. The use of the last good one is logged.
 
     Args:
         file: the file that the user named; None: found as `load_configuration` does.
@@ -36,15 +39,26 @@ def load_or_last_good(file: Path | None, environ: Mapping[str, str] | None = Non
         configuration = load_configuration(file, environ)
     except SettingsError as error:
         for home in _homes(file, environ):
-            data = StateFiles(home).read(name)
-            if data is not None:
-                try:
-                    return Configuration.model_validate_json(data), str(error)
-                except ValidationError:
-                    continue
+            try:
+                last_good = Configuration.model_validate_json((home / name).read_bytes())
+            except (OSError, ValidationError):
+                continue
+            log.warning("%s; the last good configuration is used", error)
+            return last_good, str(error)
         raise
-    StateFiles(configuration.home).write(name, configuration.model_dump_json().encode())
+    _store(configuration.home / name, configuration.model_dump_json().encode())
     return configuration, ""
+
+
+def _store(path: Path, data: bytes) -> None:
+    """Store a good configuration; a home folder that cannot be written stops no process."""
+    try:
+        if path.is_file() and path.read_bytes() == data:
+            return
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, data, 0o600)
+    except OSError as error:
+        log.warning("%s cannot be written: %s", path, error.strerror)
 
 
 def _key(file: Path | None, environ: Mapping[str, str]) -> str:
