@@ -111,5 +111,8 @@ def why_not(section: str, host: str, port: int, error: OSError) -> str:
             f"AmbientCapabilities=), or set {section}.port"
         )
     if error.errno == errno.EADDRNOTAVAIL or isinstance(error, socket.gaierror):
-        return f"{place}: this machine has no such address: set modbus.host to one that `ip address` shows"
+        return (
+            f"{place}: this machine has no such address, or not yet: as a service the station starts again until its "
+            "network is up; else set modbus.host to one that `ip address` shows"
+        )
     return f"{place}: {error.strerror or error}: set modbus.host and {section}.port to where it can be"

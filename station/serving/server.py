@@ -101,7 +101,10 @@ def listen(
         listener.close()
         why = {
             errno.EADDRINUSE: f"another program listens there; stop it, or set another {setting}.port",
-            errno.EADDRNOTAVAIL: f"that is no address of this machine; set another {setting}.host",
+            errno.EADDRNOTAVAIL: (
+                "that is no address of this machine, or not yet; as a service the station starts again until its "
+                f"network is up; else set another {setting}.host"
+            ),
             errno.EACCES: f"this user may not listen on so low a port; set {setting}.port to 1024 or more",
         }.get(error.errno or 0, f"{error.strerror}; set another {setting}.host or {setting}.port")
         raise AddressError(f"{what} cannot be served on {host}:{port}: {why}") from error

@@ -84,6 +84,14 @@ def test_the_units_times_leave_room_for_what_the_supervisor_mends_itself(root):
     assert seconds(service["TimeoutStopSec"][0]) > sum(each.stop_limit_s for each in programs)
 
 
+def test_the_station_is_started_again_without_end(root):
+    """Where a switch boots slower than this machine, its address comes after any number of starts."""
+    found = unit(root, "fruit-station.service")
+    assert found["Unit"]["StartLimitIntervalSec"] == ["0"]
+    assert found["Service"]["Restart"] == ["on-failure"]
+    assert 5 <= seconds(found["Service"]["RestartSec"][0]) <= 30
+
+
 def test_the_station_keeps_what_it_needs(root):
     service = unit(root, "fruit-station.service")["Service"]
     assert {"char-video4linux rw", "char-ttyUSB rw", "char-ttyACM rw"} == set(service["DeviceAllow"])
