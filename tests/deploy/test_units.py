@@ -84,6 +84,15 @@ def test_the_units_times_leave_room_for_what_the_supervisor_mends_itself(root):
     assert seconds(service["TimeoutStopSec"][0]) > sum(each.stop_limit_s for each in programs)
 
 
+def test_a_device_that_is_plugged_in_later_is_allowed_too(root):
+    """Before a kind's module is loaded /proc/devices does not have it, and systemd ignores its DeviceAllow."""
+    found = unit(root, "fruit-station.service")
+    module = {"char-video4linux": "videodev", "char-ttyUSB": "usbserial", "char-ttyACM": "cdc_acm"}
+    needed = {f"modprobe@{module[each.split()[0]]}.service" for each in found["Service"]["DeviceAllow"]}
+    for key in ("Wants", "After"):
+        assert needed <= {name for value in found["Unit"][key] for name in value.split()}
+
+
 def test_the_station_is_started_again_without_end(root):
     """Where a switch boots slower than this machine, its address comes after any number of starts."""
     found = unit(root, "fruit-station.service")
