@@ -106,6 +106,7 @@ class Station:
 
         devices = DeviceManager(configuration, device_changed, progress)
         _register_scrapes(metrics, configuration, records, devices.calibration)
+        metrics.expect((*devices.monitors, "plc_interface", "plc"))
         vision = VisionWorker(GoldenReference(kept, devices.calibration.golden), settings.reference)
         stack.callback(vision.close)
         observability = Observability(self.boot, versions, metrics, liveness, audit)

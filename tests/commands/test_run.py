@@ -58,7 +58,10 @@ def page(values, name, path):
 def test_a_mistake_in_the_file_does_not_keep_the_station_from_its_next_start(site, tmp_path):
     file, values = site
     with running(file, values, tmp_path / "first.log"):
-        assert 'station_alarms_active{alarm="configuration_broken"' not in page(values, "metrics", "/metrics")
+        metrics = page(values, "metrics", "/metrics")
+        assert 'station_alarms_active{id="configuration_broken",priority="low"} 0.0' in metrics
+        for link in ("camera", "gripper", "plc", "plc_interface"):
+            assert f'station_link_age_seconds{{link="{link}"}}' in metrics, "nothing is connected, which alerts report"
     file.write_text("modbus: {port: twelve}\n")
     with running(file, values, tmp_path / "second.log"):
         active = [line for line in page(values, "metrics", "/metrics").splitlines() if "configuration_broken" in line]

@@ -110,6 +110,11 @@ class Metrics(Collector):
         """Note a sign of life of a device, process or heartbeat; its age is exported from now on."""
         self._heard_s[self._label("link", link)] = self._clock()
 
+    def expect(self, links: Iterable[str]) -> None:
+        """Export the ages of links from now on, also of those never heard: a start must not hide a lost one."""
+        for link in links:
+            self._heard_s.setdefault(self._label("link", link), self._clock())
+
     def alarms(self, active: Iterable[tuple[str, str]]) -> None:
         """Export these alarms, as id and priority, and no other, as active."""
         shown = {(self._label("id", name), self._label("priority", priority)) for name, priority in active}

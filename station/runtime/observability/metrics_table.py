@@ -134,7 +134,7 @@ TABLE: dict[str, Row] = {
         "station_link_age_seconds",
         "gauge",
         ("link",),
-        "Time since a device, process or heartbeat was last heard",
+        "Time since a device, process or heartbeat was last heard, or since the station's start",
         at_scrape=True,
     ),
     "alarms": Row(

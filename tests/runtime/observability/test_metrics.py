@@ -135,6 +135,16 @@ def test_what_is_not_known_is_absent_and_not_nought(metrics):
     assert ("station_records_last_write_age_seconds",) not in scraped(metrics)
 
 
+def test_a_link_that_is_never_heard_has_an_age_from_the_start(metrics, clock):
+    metrics.heard("plc")
+    clock.now_s += 3.0
+    metrics.expect(["plc", "camera"])
+    clock.now_s += 40.0
+    found = scraped(metrics)
+    assert found["station_link_age_seconds", ("link", "camera")] == 40.0
+    assert found["station_link_age_seconds", ("link", "plc")] == 43.0
+
+
 def test_what_may_be_counted_is_there_before_it_happens(metrics):
     metrics.watch_records(lambda: Status(0, {"disk_full": 2}, 0, 0, {}, 0, 0, 0, None, None))
     found = scraped(metrics)
