@@ -7,7 +7,7 @@ import sqlite3
 from datetime import UTC, datetime
 from pathlib import Path
 
-from installer.layout import Layout
+from installer.layout import Layout, read_note
 from installer.messages import print_progress
 from installer.programs import LONG_S, own, station
 
@@ -49,12 +49,22 @@ def make_backup(layout: Layout, release: Path, kind: str) -> Path:
     return copy
 
 
-def prune(layout: Layout, kind: str, keep: int) -> None:
-    """Remove the backups of a kind, as for `make_backup`, that are older than so many newest ones."""
-    found = sorted(path for path in layout.backups.glob(f"{kind}*") if path.is_dir())
-    for path in found[: max(0, len(found) - keep)]:
+def prune(layout: Layout, kind: str, keep: int, made: Path) -> None:
+    """Remove the backups of a kind, as for `make_backup`, but for so many newest ones, of which `made` is one.
+
+    Their age is that of the records in them, by the highest number given: a clock that was set back makes names that
+    sort before older ones.
+    """
+    others = [path for path in layout.backups.glob(f"{kind}*") if path.is_dir() and path != made]
+    others.sort(key=lambda path: (_sequence(path), path.name))
+    for path in others[: max(0, len(others) + 1 - keep)]:
         shutil.rmtree(path)
         print_progress(f"removed {path}, which was older than the last {keep}")
+
+
+def _sequence(copy: Path) -> int:
+    """Return the highest number given to an inspection when a backup was made; -1 where it has no records."""
+    return read_note(copy / RECORDS / "backup.json").get("sequence", -1)
 
 
 def schema_version(folder: Path) -> str:

@@ -109,13 +109,14 @@ class Installation:
         assert self._old is not None  # noqa: S101 (an upgrade has one)
         self._was_ready = self._services.running() and ready(self._layout, self._old)
         copy = backup.make_backup(self._layout, self._old, BEFORE)
-        backup.prune(self._layout, BEFORE, _COPIES_KEPT)
+        backup.prune(self._layout, BEFORE, _COPIES_KEPT, copy)
         note = {"from": self._old.name, "to": self.release.name}
         before = read_note(self._layout.upgrade)
         # An interrupted upgrade has perhaps changed the file already: what it was before is in the earlier note.
         known = before.get("configuration") if note.items() <= before.items() else None
         text = self._layout.configuration.read_text(encoding="utf-8") if self._changes else known
-        write_note(self._layout.upgrade, {**note, "copy": copy.name, "configuration": text})
+        schema = backup.schema_version(copy / backup.RECORDS)
+        write_note(self._layout.upgrade, {**note, "copy": copy.name, "schema": schema, "configuration": text})
         point(self._layout.previous, self._old)
 
     def _make_places(self) -> None:

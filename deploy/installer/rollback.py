@@ -12,14 +12,19 @@ from installer.services import Services
 
 
 def check(layout: Layout) -> None:
-    """Check that there is a release to roll back to.
+    """Check that there is a release to roll back to, and that it can read the records, or the backup has older ones.
 
     Raises:
-        Refused: there is none.
+        Refused: there is none, or it cannot.
     """
     old, note = target(layout.previous), read_note(layout.upgrade)
     if old is None or not complete(old) or not note:
         raise Refused("there is no upgrade to take back: only the last one can be, and only once")
+    copy = layout.backups / str(note["copy"])
+    if not copy.is_dir() and note.get("schema") != backup.schema_version(layout.home / backup.RECORDS):
+        raise Refused(
+            f"{copy} is gone, and {old.name} cannot read the records as they are: put this backup back to its place"
+        )
 
 
 def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> None:

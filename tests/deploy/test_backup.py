@@ -1,8 +1,10 @@
 """Copies of records, state and configuration, as the timer has them made."""
 
 import json
+import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 
 import pytest
 
@@ -69,3 +71,38 @@ def test_a_copy_that_failed_leaves_nothing_that_looks_like_one(root, installed):
 
 def test_without_a_station_there_is_nothing_to_copy(root, tmp_path, installer):
     assert backup(root, installer("layout").Layout(tmp_path)).returncode == 2
+
+
+def made_before(layout, name, sequence):
+    """A backup whose name says when it was made, and whose records have this highest number."""
+    (layout.backups / name / "records").mkdir(parents=True)
+    (layout.backups / name / "records/backup.json").write_text(json.dumps({"sequence": sequence}))
+
+
+def test_after_a_clock_was_set_back_the_copy_just_made_stays_and_the_oldest_records_go(root, installed):
+    for name, sequence in (("daily-20990103T000000Z", 1), ("daily-20990101T000000Z", 2), ("daily-20990102T000000Z", 3)):
+        made_before(installed, name, sequence)
+    done = backup(root, installed, "--keep", "3")
+    assert done.returncode == 0, done.stdout
+    left = {path.name for path in installed.backups.iterdir()}
+    assert "daily-20990103T000000Z" not in left
+    (made,) = left - {"daily-20990101T000000Z", "daily-20990102T000000Z"}
+    assert (installed.backups / made / "settings/station.yaml").exists()
+
+
+def test_a_rollback_without_its_copy_is_refused_where_the_records_need_it(installed, installer):
+    old = installed.current.resolve()
+    installer("layout").point(installed.previous, old)
+    note = {"from": old.name, "to": "0.2.0+test", "copy": "before-upgrade-20260101T000000Z", "configuration": None}
+    (installed.home / "records").mkdir()
+    with closing(sqlite3.connect(installed.home / "records/records.sqlite3")) as connection:
+        connection.executescript("CREATE TABLE alembic_version (version_num); INSERT INTO alembic_version VALUES (8)")
+    check, refused = installer("rollback").check, installer("messages").Refused
+    installer("layout").write_note(installed.upgrade, {**note, "schema": "7"})
+    with pytest.raises(refused, match="before-upgrade-20260101T000000Z is gone"):
+        check(installed)
+    installer("layout").write_note(installed.upgrade, {**note, "schema": "8"})
+    check(installed)
+    installer("layout").write_note(installed.upgrade, {**note, "schema": "7"})
+    made_before(installed, note["copy"], 1)
+    check(installed)
