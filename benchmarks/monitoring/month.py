@@ -118,6 +118,7 @@ class Line:
         metrics = Metrics("0.1.0", _DEADLINE_S, clock=lambda: self._now_s)
         metrics.watch_records(self._records)
         metrics.watch_calibration(lambda: (self._now_s - self._calibrated_s, self._now_s - self._verified_s, 0.01))
+        metrics.watch_backup(lambda: self.plan.begin_s + self._now_s - (self._now_s - 3.5 * HOUR_S) % DAY_S)
         metrics.watch_outbox(self._outbox)
         metrics.ready(ready=True)
         return metrics

@@ -7,11 +7,13 @@ import sqlite3
 from datetime import UTC, datetime
 from pathlib import Path
 
-from installer.layout import Layout, read_note
-from installer.messages import print_progress
+from installer.layout import NAME, Layout, read_note
+from installer.messages import Failed, print_progress
 from installer.programs import LONG_S, own, station
 
-LEFT_OUT = frozenset({"records", "run", "panel_jobs", "logs"})
+LAST_BACKUP = "last_backup"
+"""An empty file of the home folder; its time is that of the last complete backup, which the station exports."""
+LEFT_OUT = frozenset({"records", "run", "panel_jobs", "logs", LAST_BACKUP})
 """Of the home folder: the records are copied by the station itself, the rest is of the moment."""
 RECORDS, STATE, SETTINGS = "records", "state", "settings"
 DAILY = "daily-"
@@ -29,7 +31,7 @@ def make_backup(layout: Layout, release: Path, kind: str) -> Path:
         The folder. It has this name only when it is complete.
 
     Raises:
-        Failed: the records could not be copied, for example because the disk is full.
+        Failed: the records could not be copied, for example because the disk is full, or a file cannot be read.
     """
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     names = (f"{kind}{stamp}{'' if number == 1 else f'-{number}'}" for number in itertools.count(1))
@@ -38,7 +40,7 @@ def make_backup(layout: Layout, release: Path, kind: str) -> Path:
     for left in layout.backups.glob(".*.partial"):
         shutil.rmtree(left, ignore_errors=True)
     partial.mkdir(mode=0o750)
-    own(layout, partial, "fruit-station", "fruit-station")
+    own(layout, partial, NAME, NAME)
     if (layout.home / RECORDS / _DATABASE).exists():
         station(layout, release, "records", "backup", partial / RECORDS, limit_s=LONG_S)
     kept = [path.name for path in layout.home.iterdir() if path.name not in LEFT_OUT] if layout.home.is_dir() else []
@@ -46,6 +48,8 @@ def make_backup(layout: Layout, release: Path, kind: str) -> Path:
         _copied(layout.home / name, partial / STATE / name)
     _copied(layout.settings, partial / SETTINGS)
     partial.rename(copy)
+    (layout.home / LAST_BACKUP).touch()
+    own(layout, layout.home / LAST_BACKUP, NAME, NAME)
     return copy
 
 
@@ -85,6 +89,17 @@ def _copied(path: Path, to: Path) -> None:
 
 
 def _copied_file(path: Path | str, to: Path | str) -> None:
-    """Copy a file, unless it has been removed meanwhile: the station writes files under temporary names."""
-    with contextlib.suppress(FileNotFoundError):
+    """Copy a file, unless it has been removed meanwhile: the station writes files under temporary names.
+
+    Raises:
+        Failed: this user may not read it.
+    """
+    try:
         shutil.copy2(path, to)
+    except FileNotFoundError:
+        return
+    except PermissionError as error:
+        raise Failed(
+            f"{error.filename} cannot be read, so there is no backup: let the group {NAME} read it (chgrp, chmod g+r), "
+            "or keep it elsewhere"
+        ) from error

@@ -11,16 +11,18 @@ from station.records.audit import AuditEntry, append_audit
 from station.records.audit_check import Proof
 from station.records.backup import make_backup
 from station.records.clock import formatted
-from station.records.database import reading
+from station.records.database import reading, records_folder
 from station.records.holds import hold as place_hold
 from station.records.holds import read_holds
 from station.records.holds import release as release_hold
+from station.records.images import MB
 from station.records.integrity_check import check_records
 from station.records.lots import end_lot, read_lots, start_lot
 from station.records.restore import restore_backup
 from station.records.short_transaction import short_transaction
 from station.records.signing import public_keys_of
 from station.records.texts import printable
+from station.settings.configuration import load_configuration
 
 _ROLE = "command line"
 _thing = click.argument("thing", metavar="SEQUENCE|LOT")
@@ -122,9 +124,12 @@ def holds(config: Path | None) -> None:
 def backup(directory: Path, config: Path | None) -> None:
     """Copy the database and all images to the new folder DIR, also while the station runs, and verify the copy.
 
-    DIR appears when it is complete and on the disk; it must not exist before.
+    DIR appears when it is complete and on the disk; it must not exist before. It takes nothing of the space below which
+    the station removes images.
     """
-    made = make_backup(folder_of(config), directory)
+    site = load_configuration(config)
+    reserve_bytes = 2 * site.records.free_reserve_mb * MB
+    made = make_backup(records_folder(site.home), directory, reserve_bytes)
     click.echo(f"{directory}: {made.inspections} inspections, {made.images} images, {made.size_bytes} bytes, verified")
     if made.audit_head:
         click.echo(f"the audit trail's last row in it: {made.audit_head}")

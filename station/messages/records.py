@@ -161,7 +161,7 @@ BACKUP_OTHER_KEY = define(
 IMAGE_MISSING = define("records.image_missing", "{path}: the image {image} is missing")
 NO_SPACE_FOR_BACKUP = define(
     "records.no_space_for_backup",
-    "{path}: {free} bytes are free, the backup takes {wanted}",
+    "{path}: {free} bytes are free, the backup and the reserve that the station needs take {wanted}",
     free=Number(0),
     wanted=Number(0),
 )

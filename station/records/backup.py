@@ -55,11 +55,12 @@ class Manifest(BaseModel):
     """Images that could not be copied, or were missing before."""
 
 
-def make_backup(folder: Path, directory: Path) -> Manifest:
+def make_backup(folder: Path, directory: Path, reserve_bytes: int = 0) -> Manifest:
     """Copy database and images. The database is a snapshot of one moment; the station does not wait.
 
     Args:
         directory: must not exist; it is `.NAME.partial` beside it until it is complete.
+        reserve_bytes: left free where the backup is on the records' own disk.
 
     Raises:
         RecordsError: it exists, there is no space, or the disk failed; then no `directory` is left.
@@ -69,7 +70,7 @@ def make_backup(folder: Path, directory: Path) -> Manifest:
     partial = directory.with_name(f".{directory.name}{_PARTIAL}")
     try:
         _remove(partial)
-        _room(folder, directory.parent)
+        _room(folder, directory.parent, reserve_bytes)
         (partial / FOLDER_NAME).mkdir(parents=True)
         manifest = _copied(folder, partial)
         content = manifest.model_dump_json(indent=1).encode()
@@ -240,11 +241,13 @@ def _copy_images(folder: Path, partial: Path) -> tuple[int, tuple[str, ...], lis
     return size_bytes, tuple(missing), notes
 
 
-def _room(folder: Path, place: Path) -> None:
+def _room(folder: Path, place: Path, reserve_bytes: int) -> None:
     wanted = sum(file.stat().st_size for file in folder.glob(f"{FILE_NAME}*"))
     with reading(folder) as connection:
         wanted += sum(referred(connection).values())
     place.mkdir(parents=True, exist_ok=True)
+    if place.stat().st_dev == folder.stat().st_dev:
+        wanted += reserve_bytes
     free = shutil.disk_usage(place).free
     if free < wanted:
         raise DiskFullError(

@@ -18,6 +18,7 @@ from station.messages.message import Message, verbatim
 from station.messages.supervision import TASK_ENDED
 from station.outbox.lag import OutboxMonitor
 from station.outbox.status import outbox_folder, read_status
+from station.records.last_backup import last_backup_utc_s
 from station.records.records import Records
 from station.runtime.alarms.commands import AlarmCommands
 from station.runtime.alarms.manager import AlarmManager
@@ -232,5 +233,6 @@ def _register_scrapes(
 ) -> None:
     metrics.watch_calibration(lambda: calibrated.figures)
     metrics.watch_records(records.status)
+    metrics.watch_backup(partial(last_backup_utc_s, configuration.home))
     if configuration.outbox.postgresql.enabled or configuration.outbox.mqtt.enabled:
         metrics.watch_outbox(partial(read_status, outbox_folder(configuration.home)))

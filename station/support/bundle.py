@@ -11,6 +11,7 @@ import os
 import platform
 import shutil
 import sys
+import time
 import urllib.request
 import zipfile
 from collections.abc import Callable, Iterator
@@ -22,6 +23,7 @@ from typing import IO
 
 from station.errors import StationError
 from station.records.database import reading, records_folder
+from station.records.last_backup import last_backup_utc_s
 from station.records.queries import read_alarm_log, read_alarms, read_inspection
 from station.records.report import format_inspection, format_list
 from station.records.search import Query, find_page
@@ -77,14 +79,19 @@ def _parts(site: Configuration) -> Iterator[tuple[str, Callable[[], str | bytes]
 def _about(home: Path) -> str:
     disk = shutil.disk_usage(home)
     return (
-        f"made         {datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC\n"
+        f"made         {_time(time.time())}\n"
         f"station      {version('fruit-station')}\n"
         f"Python       {sys.version.split()[0]}\n"
         f"system       {platform.platform()}\n"
         f"processors   {os.cpu_count()}\n"
         f"home         {home}\n"
         f"disk         {disk.free / 1e9:.1f} GB free of {disk.total / 1e9:.1f} GB\n"
+        f"backup       {_time(last) if (last := last_backup_utc_s(home)) else 'never'}\n"
     )
+
+
+def _time(utc_s: float) -> str:
+    return f"{datetime.fromtimestamp(utc_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
 def _packages() -> str:

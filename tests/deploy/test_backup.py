@@ -1,12 +1,16 @@
 """Copies of records, state and configuration, as the timer has them made."""
 
 import json
+import os
+import shutil
 import sqlite3
 import subprocess
 import sys
 from contextlib import closing
 
 import pytest
+
+from station.records.last_backup import last_backup_utc_s
 
 
 @pytest.fixture
@@ -71,6 +75,31 @@ def test_a_copy_that_failed_leaves_nothing_that_looks_like_one(root, installed):
 
 def test_without_a_station_there_is_nothing_to_copy(root, tmp_path, installer):
     assert backup(root, installer("layout").Layout(tmp_path)).returncode == 2
+
+
+def test_a_complete_copy_is_what_the_metrics_tell_the_time_of(root, installed):
+    assert last_backup_utc_s(installed.home) == 0
+    assert backup(root, installed).returncode == 0
+    assert last_backup_utc_s(installed.home) > 1_700_000_000
+    os.utime(installed.home / "last_backup", (1.0, 1.0))
+    (installed.home / "records").mkdir()
+    (installed.home / "records/records.sqlite3").write_text("this is no database")
+    assert backup(root, installed).returncode == 1
+    assert last_backup_utc_s(installed.home) == 1.0
+
+
+def test_a_file_that_cannot_be_read_is_named(installer, installed, monkeypatch):
+    key = installed.settings / "authority.key"
+    key.write_text("secret")
+
+    def only_root_may_read_it(source, to):
+        if source == str(key):
+            raise PermissionError(13, "Permission denied", source)
+
+    monkeypatch.setattr(shutil, "copy2", only_root_may_read_it)
+    with pytest.raises(installer("messages").Failed, match=rf"{key} cannot be read, so there is no backup"):
+        installer("backup").make_backup(installed, installed.current.resolve(), "daily-")
+    assert last_backup_utc_s(installed.home) == 0
 
 
 def made_before(layout, name, sequence):

@@ -196,6 +196,21 @@ def test_a_backup_needs_its_space_and_leaves_nothing_half_made(opened, scenario,
         restore_backup(folder, small_disk, "ada", None)
 
 
+def test_a_backup_on_the_records_own_disk_leaves_the_station_its_reserve(
+    opened, scenario, inspected, noise, folder, tmp_path, ask, monkeypatch
+):
+    async def steps():
+        async with opened() as records:
+            await inspected(records, 1, noise())
+
+    scenario(steps)
+    monkeypatch.setenv("STATION_RECORDS_FREE_RESERVE_MB", "1000000")
+    refused = ask("backup", tmp_path / "copy")
+    assert refused.exit_code == 1
+    assert "the reserve that the station needs" in str(refused.exception)
+    assert not (tmp_path / "copy").exists()
+
+
 def test_a_check_finds_what_is_wrong_and_the_next_start_reconciles(
     opened, scenario, inspected, noise, folder, ask, trigger
 ):

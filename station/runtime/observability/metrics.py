@@ -46,6 +46,7 @@ class Metrics(Collector):
         self._reference: tuple[float, float] | None = None
         self._status: Callable[[], Status] | None = None
         self._figures: Callable[[], Sequence[float | None]] | None = None
+        self._backup: Callable[[], float] | None = None
         self._outbox: Callable[[], OutboxStatus | None] = lambda: None
         buckets = tuple(round(share * deadline_s, 6) for share in DEADLINE_SHARES)
         self._made: dict[str, Any] = {
@@ -142,6 +143,10 @@ class Metrics(Collector):
         """Read at each scrape the ages of calibration and verification, and the drift: `ActiveCalibration.figures`."""
         self._figures = figures
 
+    def watch_backup(self, last_utc_s: Callable[[], float]) -> None:
+        """Read the time of the last backup at each scrape."""
+        self._backup = last_utc_s
+
     def watch_outbox(self, status: Callable[[], OutboxStatus | None]) -> None:
         """Read the outbox's state at each scrape."""
         self._outbox = status
@@ -184,6 +189,8 @@ class Metrics(Collector):
                     yield GaugeMetricFamily(TABLE[key].name, TABLE[key].help, value)
         if self._status is not None:
             yield from _of_records(self._status())
+        if self._backup is not None:
+            yield GaugeMetricFamily(TABLE["backup_timestamp"].name, TABLE["backup_timestamp"].help, self._backup())
         if (told := self._outbox()) is not None:
             yield from _of_outbox(told)
 

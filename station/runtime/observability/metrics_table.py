@@ -177,6 +177,13 @@ TABLE: dict[str, Row] = {
         at_scrape=True,
         known=(("kept",), ("dropped",), ("failed",), ("removed",)),
     ),
+    "backup_timestamp": Row(
+        "station_backup_timestamp_seconds",
+        "gauge",
+        (),
+        "Time of the last complete backup, since 1970; 0 before the first",
+        at_scrape=True,
+    ),
     "outbox_connected": Row(
         "station_outbox_connected", "gauge", ("destination",), "1 while another system is connected", at_scrape=True
     ),

@@ -53,6 +53,7 @@ def everything_told(metrics, outcome):
     status = Status(9, {"disk_full": 2}, 1, 2, {"kept": 5, "dropped": 1}, 1000, 2000, 3000, 0.5, None)
     metrics.watch_records(lambda: status)
     metrics.watch_calibration(lambda: (86_400.0, 60.0, -0.02))
+    metrics.watch_backup(lambda: 1_782_790_452.0)
     told = DestinationStatus(connected=False, told=7, refused=1, waiting=12, oldest_utc_ms=5, error=None)
     metrics.watch_outbox(lambda: OutboxStatus(utc_ms=9, destinations={"postgresql": told}))
 
