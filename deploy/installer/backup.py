@@ -13,8 +13,13 @@ from installer.programs import LONG_S, own, station
 
 LAST_BACKUP = "last_backup"
 """An empty file of the home folder; its time is that of the last complete backup, which the station exports."""
-LEFT_OUT = frozenset({"records", "run", "panel_jobs", "logs", LAST_BACKUP})
-"""Of the home folder: the records are copied by the station itself, the rest is of the moment."""
+_OF_THE_CELL = frozenset({"held_for_a_person", "stopped_by_a_person", "mode", "plc"})
+"""Whether a fruit is held, a person has stopped the station or works in the cell, and what is open with the PLC."""
+LEFT_OUT = frozenset({"records", "run", "panel_jobs", "logs", LAST_BACKUP}) | _OF_THE_CELL
+"""Of the home folder: the records are copied by the station itself, the rest is of the moment.
+
+A restore must not replace what is so now in the cell by what was so when the backup was made.
+"""
 RECORDS, STATE, SETTINGS = "records", "state", "settings"
 DAILY = "daily-"
 _DATABASE = Path("records.sqlite3")

@@ -13,22 +13,43 @@ import pytest
 from station.records.last_backup import last_backup_utc_s
 
 
-@pytest.fixture
-def installed(installer, tmp_path):
+def make_installation(installer, folder):
     """A scratch root with this environment as its release."""
-    layout = installer("layout").Layout(tmp_path)
+    layout = installer("layout").Layout(folder)
     release = layout.releases / "0.1.0+test"
     (release / "venv/bin").mkdir(parents=True)
     (release / "venv/bin/station").write_text(f'#!/bin/sh\nexec {sys.executable} -m station "$@"\n')
     (release / "venv/bin/station").chmod(0o755)
     installer("layout").write_note(release / "release.json", {"version": "0.1.0"})
     installer("layout").point(layout.current, release)
-    for folder in (layout.settings, layout.home, layout.backups):
-        folder.mkdir(parents=True)
+    for made in (layout.settings, layout.home, layout.backups):
+        made.mkdir(parents=True)
     layout.configuration.write_text("hmi: {port: 8443}\n")
     (layout.home / "active_recipe.json").write_text("{}")
     (layout.home / "run").mkdir()
     return layout
+
+
+@pytest.fixture
+def installed(installer, tmp_path):
+    """An installation in a scratch root."""
+    return make_installation(installer, tmp_path)
+
+
+def station(layout, *arguments):
+    command = [layout.current / "venv/bin/station", *arguments]
+    done = subprocess.run(command, env=layout.environment(), check=True, capture_output=True, text=True)
+    return done.stdout
+
+
+def begin_records(layout, after):
+    """Records as a station's first start makes them, whose next number is `after` + 1."""
+    station(layout, "records", "continue-after", str(after))
+    begin = "import asyncio,sys\nfrom pathlib import Path\nfrom station.records.records import Records\n"
+    begin += "from station.settings.records import RecordsSettings\nasync def go():\n"
+    begin += " records = Records(Path(sys.argv[1]), RecordsSettings(), 'boot')\n await records.reopen()\n"
+    begin += " await records.close()\nasyncio.run(go())\n"
+    subprocess.run([sys.executable, "-c", begin, layout.home / "records"], check=True, capture_output=True)
 
 
 def backup(root, layout, *arguments):
@@ -37,15 +58,7 @@ def backup(root, layout, *arguments):
 
 
 def test_all_that_cannot_be_made_again_is_copied_and_the_oldest_goes(root, installed, installer):
-    subprocess.run(
-        [installed.current / "venv/bin/station", "records", "continue-after", "41"],
-        env=installed.environment(), check=True, capture_output=True,
-    )  # fmt: skip
-    begin = "import asyncio,sys\nfrom pathlib import Path\nfrom station.records.records import Records\n"
-    begin += "from station.settings.records import RecordsSettings\nasync def go():\n"
-    begin += " records = Records(Path(sys.argv[1]), RecordsSettings(), 'boot')\n await records.reopen()\n"
-    begin += " await records.close()\nasyncio.run(go())\n"
-    subprocess.run([sys.executable, "-c", begin, installed.home / "records"], check=True, capture_output=True)
+    begin_records(installed, 41)
     for _ in range(3):
         done = backup(root, installed, "--keep", "2")
         assert done.returncode == 0, done.stdout
@@ -100,6 +113,74 @@ def test_a_file_that_cannot_be_read_is_named(installer, installed, monkeypatch):
     with pytest.raises(installer("messages").Failed, match=rf"{key} cannot be read, so there is no backup"):
         installer("backup").make_backup(installed, installed.current.resolve(), "daily-")
     assert last_backup_utc_s(installed.home) == 0
+
+
+STAND_INS = {
+    "sudo": 'exec "$@"',
+    "runuser": 'shift 3; exec "$@"',
+    "station": 'exec "$PROGRAM" "$@"',
+    **dict.fromkeys(("systemctl", "chown", "chgrp", "systemd-tmpfiles"), 'echo "$(basename "$0")" "$@" >> "$LOG"'),
+}
+"""For a scratch root, where nothing runs and nobody is another user."""
+
+
+def documented_restore(root):
+    """The commands of docs/deployment.md that restore a backup."""
+    text = (root / "docs/deployment.md").read_text()
+    return text.split("To restore a backup", 1)[1].split("```\n", 2)[1]
+
+
+def test_a_replacement_machine_is_restored_as_the_document_has_it(root, installer, tmp_path):
+    lost, new = (make_installation(installer, tmp_path / name) for name in ("lost", "new"))
+    begin_records(lost, 41)
+    (lost.home / "calibrations").mkdir()
+    (lost.home / "calibrations/newest.json").write_text("{}")
+    (lost.home / "plc").mkdir()
+    for name, then, now in (
+        ("held_for_a_person", "no", "fruit_held"),
+        ("mode", "1", "3"),
+        ("plc/journal.json", "1", ""),
+    ):
+        (lost.home / name).write_text(then)
+        if now:
+            (new.home / name).write_text(now)
+    lost.configuration.write_text("hmi: {port: 9443}\n")
+    public_key = station(lost, "audit", "public-key")
+    assert backup(root, lost).returncode == 0
+    (made,) = lost.backups.iterdir()
+    begin_records(new, 0)
+    shutil.copytree(made, new.backups / made.name)
+    (new.backups / "station-7.pem").write_text(public_key)
+
+    stand_ins = tmp_path / "bin"
+    stand_ins.mkdir()
+    for name, does in STAND_INS.items():
+        (stand_ins / name).write_text(f"#!/bin/sh\n{does}\n")
+        (stand_ins / name).chmod(0o755)
+    commands = documented_restore(root).replace("daily-20260630T033412Z", made.name)
+    for folder in ("/var/", "/etc/"):
+        commands = commands.replace(folder, f"{new.root}{folder}")
+    before = new.settings.stat()
+    done = subprocess.run(
+        ["sh", "-eu", "-c", commands], capture_output=True, text=True, check=False, cwd=tmp_path,
+        env=new.environment() | {
+            "PATH": f"{stand_ins}:{os.environ['PATH']}", "LOG": str(tmp_path / "log"),
+            "PROGRAM": str(new.current / "venv/bin/station"), "PYTHONPATH": str(root),
+        },
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "restored 0 inspections" in done.stdout
+    assert new.configuration.read_text() == "hmi: {port: 9443}\n"
+    assert (new.home / "calibrations/newest.json").exists()
+    assert (new.home / "held_for_a_person").read_text() == "fruit_held", "what is so in the cell now"
+    assert (new.home / "mode").read_text() == "3"
+    assert not (new.home / "plc").exists()
+    after = new.settings.stat()
+    assert (after.st_uid, after.st_gid) == (before.st_uid, before.st_gid)
+    log = (tmp_path / "log").read_text()
+    assert f"chgrp -R fruit-station {new.settings}" in log
+    assert "systemd-tmpfiles --create fruit-station.conf" in log
+    assert log.splitlines()[-1] == "systemctl start fruit-station"
 
 
 def made_before(layout, name, sequence):
