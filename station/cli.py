@@ -108,8 +108,11 @@ def main() -> NoReturn:
         sys.stderr.close()
         code = 1
     except OSError as error:
-        if error.errno != errno.ENOSPC:
+        if error.errno == errno.ENOSPC:
+            click.echo(f"station: {error.strerror}; free space where the output goes", err=True)
+            os._exit(1)  # standard output cannot be flushed: the interpreter would complain of it on its way out
+        if error.filename is None:
             raise
-        click.echo(f"station: {error.strerror}; free space where the output goes", err=True)
-        os._exit(1)  # standard output cannot be flushed: the interpreter would complain of it on its way out
+        click.echo(f"station: {error.filename}: {error.strerror}", err=True)
+        code = 1
     raise SystemExit(code if isinstance(code, int) else 0)

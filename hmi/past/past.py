@@ -124,7 +124,7 @@ class Past:
 
         def write() -> bytes:
             file = io.BytesIO()
-            bundle(self._site, file)
+            bundle(self._site, "", file)
             return file.getvalue()
 
         return await self._worker.do(write)

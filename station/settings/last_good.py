@@ -1,5 +1,6 @@
 """Last good configuration: the station's processes run by it while its file is broken."""
 
+import contextlib
 import hashlib
 import logging
 import os
@@ -34,20 +35,24 @@ def load_or_last_good(file: Path | None, environ: Mapping[str, str] | None = Non
         SettingsError: it is broken, and there is no last good one.
     """
     environ = os.environ if environ is None else environ
-    name = f"{_FOLDER}/{_key(file, environ)}.json"
     try:
         configuration = load_configuration(file, environ)
     except SettingsError as error:
-        for home in _homes(file, environ):
-            try:
-                last_good = Configuration.model_validate_json((home / name).read_bytes())
-            except (OSError, ValidationError):
-                continue
-            log.warning("%s; the last good configuration is used", error)
-            return last_good, str(error)
-        raise
-    _store(configuration.home / name, configuration.model_dump_json().encode())
+        last_good = read_last_good(file, environ)
+        if last_good is None:
+            raise
+        log.warning("%s; the last good configuration is used", error)
+        return last_good, str(error)
+    _store(configuration.home / _name(file, environ), configuration.model_dump_json().encode())
     return configuration, ""
+
+
+def read_last_good(file: Path | None, environ: Mapping[str, str]) -> Configuration | None:
+    """Return the last good configuration of a file, as `load_or_last_good` does; None for none."""
+    for home in _homes(file, environ):
+        with contextlib.suppress(OSError, ValidationError):
+            return Configuration.model_validate_json((home / _name(file, environ)).read_bytes())
+    return None
 
 
 def _store(path: Path, data: bytes) -> None:
@@ -61,11 +66,11 @@ def _store(path: Path, data: bytes) -> None:
         log.warning("%s cannot be written: %s", path, error.strerror)
 
 
-def _key(file: Path | None, environ: Mapping[str, str]) -> str:
-    """Return a name for the configuration's source, so that those of two stations are never mixed up."""
+def _name(file: Path | None, environ: Mapping[str, str]) -> str:
+    """Return the file's name in the home folder, by the source, so that those of two stations are never mixed up."""
     named = file or environ.get(CONFIG_VARIABLE) or ""
     place = str(Path(named).absolute()) if named else "default"
-    return hashlib.sha256(place.encode()).hexdigest()[:16]
+    return f"{_FOLDER}/{hashlib.sha256(place.encode()).hexdigest()[:16]}.json"
 
 
 def _homes(file: Path | None, environ: Mapping[str, str]) -> list[Path]:

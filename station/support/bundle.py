@@ -10,6 +10,7 @@ import json
 import os
 import platform
 import shutil
+import subprocess
 import sys
 import time
 import urllib.request
@@ -32,12 +33,18 @@ from station.settings.recipe import recipe_files
 
 LOG_BYTES = 2_000_000
 """Of the end of each log file."""
+_JOURNAL_LINES, _JOURNAL_LIMIT_S = 10_000, 30.0
 _INSPECTIONS_LISTED, _INSPECTIONS_WHOLE, _ALARMS = 200, 20, 1_000
 _ANSWER_LIMIT_S = 2.0
 
 
-def bundle(site: Configuration, target: Path | IO[bytes]) -> tuple[str, ...]:
+def bundle(site: Configuration, broken: str, target: Path | IO[bytes]) -> tuple[str, ...]:
     """Write the bundle; a part that cannot be had is replaced by the reason, as a station in trouble has few parts.
+
+    Args:
+        site: the last good configuration where the present one is broken.
+        broken: the error in the present configuration's files; empty for none.
+        target: the ZIP file.
 
     Returns:
         The names of the parts.
@@ -45,7 +52,7 @@ def bundle(site: Configuration, target: Path | IO[bytes]) -> tuple[str, ...]:
     Raises:
         OSError: the file cannot be written.
     """
-    parts = dict(_parts(site))
+    parts = dict(_parts(site, broken))
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, make in parts.items():
             archive.writestr(name, _made(make))
@@ -55,15 +62,17 @@ def bundle(site: Configuration, target: Path | IO[bytes]) -> tuple[str, ...]:
 def _made(make: Callable[[], str | bytes]) -> str | bytes:
     try:
         return make()
-    except (StationError, OSError, ValueError, HTTPException) as error:
+    except (StationError, OSError, ValueError, HTTPException, subprocess.TimeoutExpired) as error:
         return f"not available: {error}\n"
 
 
-def _parts(site: Configuration) -> Iterator[tuple[str, Callable[[], str | bytes]]]:
+def _parts(site: Configuration, broken: str) -> Iterator[tuple[str, Callable[[], str | bytes]]]:
     """Yield each part's name with the function that makes it."""
     yield "about.txt", lambda: _about(site.home)
     yield "packages.txt", _packages
     yield "configuration.json", lambda: site.model_dump_json(indent=2)
+    if broken:
+        yield "configuration_error.txt", lambda: f"{broken}\n"
     with contextlib.suppress(StationError):  # no folder of recipes: the readiness says so
         for file in recipe_files(site.recipes_folder):
             yield f"recipes/{file.name}", file.read_bytes
@@ -71,6 +80,7 @@ def _parts(site: Configuration) -> Iterator[tuple[str, Callable[[], str | bytes]
         yield f"{page}.txt", lambda page=page: _answer(site, page)
     for file in sorted((site.home / "logs").glob("*.log")):
         yield f"logs/{file.name}", lambda file=file: _end_of(file)
+    yield "logs/journal.txt", _journal
     folder = records_folder(site.home)
     yield "alarms.json", lambda: _alarms(folder)
     yield "inspections.txt", lambda: _inspections(folder)
@@ -118,6 +128,16 @@ def _end_of(file: Path) -> bytes:
     with file.open("rb") as opened:
         opened.seek(max(0, file.stat().st_size - LOG_BYTES))
         return opened.read()
+
+
+def _journal() -> str:
+    """Return the end of an installed station's log, which its unit writes to the system's journal."""
+    command = ["journalctl", "--no-pager", "--output=short-iso", f"--lines={_JOURNAL_LINES}"]
+    command += [f"--unit={unit}" for unit in ("fruit-station", "fruit-station-backup")]
+    done = subprocess.run(  # noqa: S603 (no argument is from outside)
+        command, capture_output=True, text=True, errors="replace", timeout=_JOURNAL_LIMIT_S, check=False
+    )
+    return (done.stdout + done.stderr)[-LOG_BYTES:]
 
 
 def _alarms(folder: Path) -> str:

@@ -122,6 +122,18 @@ def test_the_backup_finds_what_the_station_has(root):
     assert timer["Timer"]["Persistent"] == "yes"
 
 
+@pytest.mark.parametrize(("command", "groups"), [("support", "-g fruit-station -G systemd-journal "), ("records", "")])
+def test_only_the_support_bundle_of_an_installed_station_reads_the_journal(tmp_path, root, command, groups):
+    for name, does in {"id": "echo root", "runuser": 'echo "$@"'}.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{does}\n")
+        (tmp_path / name).chmod(0o755)
+    environment = {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    called = [root / "deploy/command/station", command, "--help"]
+    done = subprocess.run(called, env=environment, capture_output=True, text=True, check=True)
+    program = "/opt/fruit-station/current/venv/bin/station"
+    assert done.stdout == f"-u fruit-station {groups}-- {program} {command} --help\n"
+
+
 def test_the_calendar_is_one(root, tool):
     when = unit(root, UNITS[2])["Timer"]["OnCalendar"][0]
     subprocess.run([tool("systemd-analyze"), "calendar", when], check=True, capture_output=True)
