@@ -10,8 +10,9 @@ from installer.layout import NAME, TIMER, UNIT, Layout
 from installer.messages import Failed, print_progress
 from installer.programs import run
 
-_LIMIT_S = 200.0
-"""For the station's start, and for its end."""
+_START_LIMIT_S, _STOP_LIMIT_S = 4200.0, 200.0
+"""Longer than the unit's own limits, which end it: a start that migrates the records of years extends its limit, by an
+hour at most."""
 
 
 class Systemd:
@@ -64,7 +65,7 @@ class Systemd:
     def stop(self) -> None:
         """Stop the station in order. Idempotent."""
         if self._booted:
-            run("systemctl", "stop", UNIT, limit_s=_LIMIT_S)
+            run("systemctl", "stop", UNIT, limit_s=_STOP_LIMIT_S)
 
     def start(self) -> bool:
         """Start it; returns False where nothing can be started, as in a scratch root.
@@ -76,7 +77,7 @@ class Systemd:
             print_progress("systemd does not run here: the station starts when it does")
             return False
         run("systemctl", "reset-failed", UNIT)
-        run("systemctl", "start", UNIT, limit_s=_LIMIT_S)
+        run("systemctl", "start", UNIT, limit_s=_START_LIMIT_S)
         return True
 
 

@@ -172,9 +172,11 @@ def make_schema(connection: Connection, revision: str) -> None:
 
 
 def _backed_up(folder: Path, revision: str) -> Path:
-    """Copy the whole database, durably before the copy gets its name."""
+    """Copy the whole database, durably before the copy gets its name. What a killed start left is removed first."""
     backup = folder / "backups" / f"{stamp()}-form-{revision}.sqlite3"
     backup.parent.mkdir(exist_ok=True)
+    for left in backup.parent.glob("*.partial"):
+        left.unlink()
     size_bytes = (folder / FILE_NAME).stat().st_size
     if shutil.disk_usage(folder).free < 2 * size_bytes:
         raise DiskFullError(messages.NO_SPACE_FOR_COPY(path=str(backup), size_bytes=size_bytes), messages.FREE_SPACE())

@@ -46,7 +46,7 @@ from station.runtime.state_files import StateFiles
 from station.settings.configuration import Configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
-from station.supervision.notify import feed_watchdog, notify
+from station.supervision.notify import extended_start, feed_watchdog, notify
 
 log = logging.getLogger(__name__)
 
@@ -113,7 +113,9 @@ class Station:
         observability = Observability(self.boot, versions, metrics, liveness, audit)
         inspector = Inspector(devices, vision, configuration, alarms, metrics)
         self.service = service = Service(configuration, records, devices, inspector, alarms, observability)
-        await service.registry.reopen(lambda: alarms.restore(records))
+        # The first start of a release may migrate the records of years, which takes longer than any other start.
+        async with extended_start():
+            await service.registry.reopen(lambda: alarms.restore(records))
         self.recipes = book = ActiveRecipes(configuration.recipes_folder, kept)
         await asyncio.to_thread(book.read)
         lots = LotManager(service, book, audit)

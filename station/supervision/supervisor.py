@@ -21,7 +21,7 @@ from pathlib import Path
 from station.errors import StationError
 from station.messages import supervision as messages
 from station.messages.message import Message, verbatim
-from station.supervision.notify import PARENT_VARIABLE, SOCKET_VARIABLE, WATCHDOG_VARIABLE, notify
+from station.supervision.notify import EXTEND, PARENT_VARIABLE, SOCKET_VARIABLE, WATCHDOG_VARIABLE, notify
 from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, publish
 from station.temporary_folder import make_temporary_folder
 
@@ -39,7 +39,10 @@ class SupervisionError(StationError):
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """One process to supervise. It sends READY=1 when it serves, and WATCHDOG=1 while it makes progress."""
+    """One process to supervise. It sends READY=1 when it serves, and WATCHDOG=1 while it makes progress.
+
+    A start that takes longer than its limit sends EXTEND_TIMEOUT_USEC again and again: the time until its next message.
+    """
 
     name: str
     command: tuple[str, ...]
@@ -64,12 +67,14 @@ class _Child:
         self._listening = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._listening.settimeout(0.0)
         self._listening.bind(str(self._address))
-        self.ready = self.given_up = False
+        self.ready = self.extended = self.given_up = False
+        self._start_limit_s = program.start_limit_s
         self.heard_s = 0.0
         """Time of its start or last sign of progress; monotonic."""
 
     async def start(self) -> None:
-        self.ready = False
+        self.ready = self.extended = False
+        self._start_limit_s = self.program.start_limit_s
         environment = {
             **self._environment,
             SOCKET_VARIABLE: str(self._address),
@@ -100,6 +105,11 @@ class _Child:
             self.ready |= b"READY=1" in lines
             if self.ready and not {b"READY=1", b"WATCHDOG=1"}.isdisjoint(lines):
                 self.heard_s = time.monotonic()
+            for line in lines:
+                if not self.ready and line.startswith(EXTEND) and line.removeprefix(EXTEND).isdigit():
+                    self.extended, self.heard_s = True, time.monotonic()
+                    self._start_limit_s = int(line.removeprefix(EXTEND)) / 1e6
+                    notify(line.decode())  # systemd's limit on the unit's start is extended by the same
 
     def trouble(self) -> Message | None:
         """Return the process's fault."""
@@ -108,8 +118,8 @@ class _Child:
         if self.process.returncode is not None:
             return messages.ENDED(how=_named(self.process.returncode))
         silent_s = time.monotonic() - self.heard_s
-        if not self.ready and silent_s > self.program.start_limit_s:
-            return messages.NOT_READY(limit_s=self.program.start_limit_s)
+        if not self.ready and silent_s > self._start_limit_s:
+            return messages.NOT_READY(limit_s=self._start_limit_s)
         if self.ready and silent_s > self.program.watchdog_s:
             return messages.NO_PROGRESS(limit_s=self.program.watchdog_s)
         return None
@@ -200,7 +210,7 @@ class Supervisor:
     def _feed(self) -> None:
         """Feed systemd's watchdog once all running programs, if there are any, have notified since the last time."""
         running = [child for child in self._children if not child.given_up]
-        if running and all(child.ready and child.heard_s > self._fed_s for child in running):
+        if running and all((child.ready or child.extended) and child.heard_s > self._fed_s for child in running):
             notify("WATCHDOG=1")
             self._fed_s = time.monotonic()
 

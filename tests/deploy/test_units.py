@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from station.supervision import notify
 from station.supervision.programs import station_programs
 
 MOST_EXPOSED = 2.5
@@ -82,6 +83,13 @@ def test_the_units_times_leave_room_for_what_the_supervisor_mends_itself(root):
     assert seconds(service["WatchdogSec"][0]) > max(each.watchdog_s for each in programs) + 2 * slowest_start_s
     assert seconds(service["TimeoutStartSec"][0]) > sum(each.start_limit_s for each in programs)
     assert seconds(service["TimeoutStopSec"][0]) > sum(each.stop_limit_s for each in programs)
+
+
+def test_the_installer_waits_as_long_as_the_unit_may_take(root, installer):
+    service, services = unit(root, "fruit-station.service")["Service"], installer("services")
+    longest_s = seconds(service["TimeoutStartSec"][0]) + notify._EXTENDED_LONGEST_S
+    assert longest_s < services._START_LIMIT_S
+    assert seconds(service["TimeoutStopSec"][0]) < services._STOP_LIMIT_S
 
 
 def test_a_device_that_is_plugged_in_later_is_allowed_too(root):

@@ -81,6 +81,8 @@ def test_an_earlier_form_is_brought_up_to_date_with_a_copy_kept(opened, scenario
         async with opened() as records:
             await records.begin(trigger)
         next_form()
+        (folder / "backups").mkdir()
+        (folder / "backups" / f"20260101T000000Z-form-{head}.partial").write_text("of a start that was killed")
         async with opened() as records:
             assert records.lost == (1,)
             assert await records.begin(trigger) == 2

@@ -1,9 +1,12 @@
 """What the home folder keeps: the last good form of every file, whole after a crash in the middle of writing."""
 
+import asyncio
 import json
+import socket
 
 import pytest
 
+from station.records import open as opening
 from station.runtime.recipes.active import ActiveRecipe, ActiveRecipes
 from station.runtime.state_files import StateFiles
 from station.settings.last_good import load_or_last_good
@@ -68,3 +71,25 @@ def test_a_file_is_there_whole_or_not_at_all(tmp_path):
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["b.json"]
     (tmp_path / "file").write_bytes(b"")
     assert not kept.write("file/inside", b"x")
+
+
+def test_a_start_whose_records_take_long_to_open_extends_its_limit(bench, tmp_path, monkeypatch):
+    """The migration goes on until the supervisor has heard of it."""
+    migrate, heard = opening._migrate, []
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor:
+        supervisor.bind(str(tmp_path / "notify"))
+        supervisor.settimeout(60.0)
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+
+        def long_migration(folder):
+            heard.append(supervisor.recv(4096).decode())
+            migrate(folder)
+
+        monkeypatch.setattr(opening, "_migrate", long_migration)
+
+        async def start():
+            async with bench():
+                supervisor.settimeout(0.0)
+
+        asyncio.run(start())
+    assert heard == ["EXTEND_TIMEOUT_USEC=60000000"]

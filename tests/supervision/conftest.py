@@ -29,6 +29,10 @@ async def main():
     if "deaf" not in how:
         asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
     feeding = asyncio.create_task(feed_watchdog(lambda: not (folder / f"{name}.hang").exists()))
+    if "slow" in how:
+        notify("EXTEND_TIMEOUT_USEC=60000000")
+        while not (folder / f"{name}.go").exists():
+            await asyncio.sleep(0.02)
     if "mute" not in how:
         notify("READY=1")
     await ended.wait()

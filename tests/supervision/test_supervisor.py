@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 
 import psutil
 import pytest
@@ -27,6 +28,26 @@ async def end(_supervisor, ended):
 def test_programs_start_in_order_and_end_in_reverse(bench):
     bench.run([bench.program("first"), bench.program("second")], end)
     assert bench.log() == ["start first", "start second", "end second", "end first"]
+
+
+def test_a_start_that_asks_for_more_time_gets_it_from_the_supervisor_and_from_systemd(bench, monkeypatch):
+    """As the first start of a release does, which migrates the records of years."""
+    notified: list[str] = []
+    passed_s = 0.0
+    monotonic = time.monotonic
+
+    def on_notify(message):
+        nonlocal passed_s
+        notified.append(message)
+        if message.startswith("EXTEND_TIMEOUT_USEC="):
+            passed_s = 40.0  # twice the limit of a start
+            (bench.folder / "only.go").touch()
+
+    monkeypatch.setattr(supervisor, "notify", on_notify)
+    monkeypatch.setattr(supervisor.time, "monotonic", lambda: monotonic() + passed_s)
+    bench.run([bench.program("only", "slow")], end)
+    assert bench.ready
+    assert notified[0] == "EXTEND_TIMEOUT_USEC=60000000"
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV])
