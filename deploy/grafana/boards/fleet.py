@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from deploy.grafana.boards.panel import board, chosen, prom
+from deploy.grafana.boards.panel import STATIONS, board, chosen, prom
 
 HERE = 'station=~"$station"'
 UP = f'up{{job="station", {HERE}}}'
@@ -45,6 +45,6 @@ COMPARED = (
 
 def dashboard() -> Any:
     """The dashboard."""
-    station = chosen("station", "Stations", "label_values(station_build_info, station)", several=True)
+    station = chosen("station", "Stations", STATIONS, several=True)
     about = "Which station needs attention?"
     return board("fruit-fleet", "Fleet", about, (station,), {"Now": ROWS, "Side by side": COMPARED})

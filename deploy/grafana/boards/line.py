@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from deploy.grafana.boards.panel import board, chosen, prom
+from deploy.grafana.boards.panel import STATIONS, board, chosen, prom
 
 HERE = 'station=~"$station", fruit=~"$fruit"'
 DIVERTED = f'{HERE}, outcome!="PASS"'
@@ -114,7 +114,7 @@ def dashboard() -> Any:
     return board(
         "fruit-line", "Line", "How much is rejected, why, and is that usual?",
         (
-            chosen("station", "Station", "label_values(station_build_info, station)", several=True),
+            chosen("station", "Station", STATIONS, several=True),
             chosen("fruit", "Fruit", "label_values(station_inspections_total, fruit)", several=True),
         ),
         {"Now": NOW, "Rejects": RATES, "Fruit": FRUIT},

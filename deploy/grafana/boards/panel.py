@@ -152,6 +152,10 @@ def board(uid: str, title: str, about: str, variables: tuple[Any, ...], rows: di
     return making
 
 
+STATIONS = 'label_values(up{job="station"}, station)'
+"""Query of the stations that Prometheus knows, also of one that is off for as long as the dashboard goes back."""
+
+
 def chosen(name: str, label: str, query: str, *, several: bool) -> Any:
     """Make a variable that a reader selects from existing values.
 

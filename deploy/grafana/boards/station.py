@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from deploy.grafana.boards.panel import board, chosen, prom
+from deploy.grafana.boards.panel import STATIONS, board, chosen, prom
 
 HERE = 'station="$station"'
 LASTED = "station_inspection_duration_seconds"
@@ -119,6 +119,6 @@ MACHINE = (
 def dashboard() -> Any:
     """The dashboard."""
     rows = {"Health": HEALTH, "Cycle": CYCLE, "Sensor": SENSOR, "PLC": LINE, "Records": RECORDS, "Outbox": OUTBOX}
-    station = chosen("station", "Station", "label_values(station_build_info, station)", several=False)
+    station = chosen("station", "Station", STATIONS, several=False)
     about = "Does this station do well, and if not, what of it?"
     return board("fruit-station", "Station", about, (station,), {**rows, "Machine": MACHINE})

@@ -1,12 +1,14 @@
 """The dashboards as they are committed."""
 
 import re
+import time
 
 import pytest
 import yaml
 
 from benchmarks.monitoring.asking import DASHBOARDS, dashboards, panels
 from benchmarks.monitoring.document import headings
+from benchmarks.monitoring.prometheus import running, write_configuration
 from deploy.grafana.boards.export import exported
 
 ROOT = DASHBOARDS.parents[2]
@@ -61,3 +63,24 @@ def test_uids_are_unique_and_datasources_are_provisioned():
     assert asked == {(each["type"], each["uid"]) for each in known}
     secrets = [each["secureJsonData"]["password"] for each in known if "secureJsonData" in each]
     assert all(re.fullmatch(r"\$\{\w+\}", secret) for secret in secrets)
+
+
+@pytest.mark.timeout(120)
+def test_a_station_that_is_off_can_be_selected(promtool, tmp_path):
+    """Prometheus has only its `up`, which is 0: nothing of its own for as long as it is off."""
+    queries = {
+        variable["query"]
+        for board in dashboards().values()
+        for variable in board["templating"]["list"]
+        if variable["name"] == "station" and variable["query"].startswith("label_values")
+    }
+    configuration = write_configuration(tmp_path, "1s", {"dead": "127.0.0.1:1"})
+    with running(tmp_path, configuration) as prometheus:
+        until_s = time.monotonic() + 60
+        while not prometheus.now("up == 0"):
+            assert time.monotonic() < until_s
+            time.sleep(0.1)
+        for query in queries:
+            series, label = re.fullmatch(r"label_values\((.+), (\w+)\)", query).groups()
+            assert [each.labels[label] for each in prometheus.now(series)] == ["dead"], query
+    assert queries
