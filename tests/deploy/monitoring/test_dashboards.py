@@ -81,6 +81,7 @@ def test_a_station_that_is_off_can_be_selected(promtool, tmp_path):
             assert time.monotonic() < until_s
             time.sleep(0.1)
         for query in queries:
-            series, label = re.fullmatch(r"label_values\((.+), (\w+)\)", query).groups()
-            assert [each.labels[label] for each in prometheus.now(series)] == ["dead"], query
+            found = re.fullmatch(r"label_values\((.+), (\w+)\)", query)
+            assert found
+            assert [each.labels[found[2]] for each in prometheus.now(found[1])] == ["dead"], query
     assert queries
