@@ -4,13 +4,11 @@ Every component is a standard uncertainty of one input, with the factor by which
 they are independent, so their shares of the area add by their squares (GUM 5.1.2).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import hypot, sqrt
 
 from station.inspection.press import Press
 from station.inspection.sized_limits import SizedLimits
-from station.settings.damage import Repeatability
 
 COMPONENTS = {
     "repeatability": "repeatability of the area",
@@ -71,7 +69,7 @@ def budget_at(closing_mm: float, press: Press, limits: SizedLimits) -> Budget:
     # Hertz's contact: the area goes as the closing, so an error of the closing is the same share of the area.
     per_mm = 1 / closing_mm
     components = (
-        Component("repeatability", repeatability_at(closing_mm, rule.repeatability), "", 1.0),
+        Component("repeatability", rule.repeatability_at(closing_mm), "", 1.0),
         # The contact began anywhere between the last image without it and the first with it: rectangular. Limits are
         # found with onsets as late as others, so that its middle is in both.
         Component("onset", rectangular(press.onset_uncertainty_mm or 0.0), "mm", per_mm),
@@ -86,20 +84,3 @@ def budget_at(closing_mm: float, press: Press, limits: SizedLimits) -> Budget:
 def rectangular(width: float) -> float:
     """The standard uncertainty of what lies anywhere in an interval of this width alike (GUM 4.3.7)."""
     return width / sqrt(12)
-
-
-def repeatability_at(closing_mm: float, measured: Sequence[Repeatability]) -> float:
-    """The repeatability at a closing, as a share: interpolated, and beyond the ends as at the nearest.
-
-    Args:
-        measured: in ascending order of closing.
-    """
-    before = [each for each in measured if each.closing_mm <= closing_mm]
-    after = [each for each in measured if each.closing_mm >= closing_mm]
-    if not before or not after:
-        return (before[-1:] or after[:1])[0].relative
-    low, high = before[-1], after[0]
-    if low is high:
-        return low.relative
-    share = (closing_mm - low.closing_mm) / (high.closing_mm - low.closing_mm)
-    return low.relative + share * (high.relative - low.relative)

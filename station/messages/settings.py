@@ -135,6 +135,13 @@ JUDGED_ON_ONE_STEP = define(
     below_mm=Number(),
     value=Number(),
 )
+KEPT_BY_NO_AREA = define(
+    "settings.kept_by_no_area",
+    "expected room below area_mm2, {limit_mm2} mm²: with a guard band of {guard_percent}% on either side no fruit "
+    "would pass (lower it, raise area_mm2, or lower damage.uncertainty), got {value}",
+    guard_percent=Number(1),
+    value=Number(),
+)
 STOP_BELOW_AREA = define(
     "settings.stop_below_area",
     "expected no less than the largest damage threshold, {limit_mm2} mm², got {value}",

@@ -1,5 +1,6 @@
 """Damage thresholds: limits of area and growth, their scaling with the fruit's size, and the guard band."""
 
+from collections.abc import Iterator
 from itertools import pairwise
 from statistics import NormalDist
 from typing import Annotated, Literal, Self
@@ -198,6 +199,18 @@ class AreaUncertainty(Settings):
         """Coverage factor k: the guard band is k standard uncertainties."""
         return NormalDist().inv_cdf(self.coverage)
 
+    def repeatability_at(self, closing_mm: float) -> float:
+        """Repeatability at a closing, as a share: interpolated, and beyond the ends as at the nearest."""
+        before = [each for each in self.repeatability if each.closing_mm <= closing_mm]
+        after = [each for each in self.repeatability if each.closing_mm >= closing_mm]
+        if not before or not after:
+            return (before[-1:] or after[:1])[0].relative
+        low, high = before[-1], after[0]
+        if low is high:
+            return low.relative
+        share = (closing_mm - low.closing_mm) / (high.closing_mm - low.closing_mm)
+        return low.relative + share * (high.relative - low.relative)
+
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         wrong: list[tuple[Path, Message]] = []
@@ -269,4 +282,18 @@ class DamageThresholds(Settings):
                 wrong.append((("area", index, "closing_mm"), expected))
             if after.area_mm2 < before.area_mm2:
                 wrong.append((("area", index, "area_mm2"), messages.THRESHOLD_FALLING(value=after.area_mm2)))
-        return self.accepted(*wrong)
+        return self.accepted(*wrong, *self._kept_by_no_area())
+
+    def _kept_by_no_area(self) -> Iterator[tuple[Path, Message]]:
+        """Find the limits that no area keeps with its guard band on either side: no fruit would pass.
+
+        The guard band is that of the repeatability alone, which every press has. Its other components, and a fruit's
+        size, are the press's.
+        """
+        for index, limit in enumerate(self.area):
+            guard = self.uncertainty.factor * self.uncertainty.repeatability_at(limit.closing_mm)
+            if limit.least_area_mm2 * (1 + guard) > limit.area_mm2 * (1 - guard):
+                expected = messages.KEPT_BY_NO_AREA(
+                    limit_mm2=limit.area_mm2, guard_percent=100 * guard, value=limit.least_area_mm2
+                )
+                yield ("area", index, "least_area_mm2"), expected

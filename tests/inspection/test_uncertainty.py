@@ -9,8 +9,7 @@ import pytest
 from station.inspection.fruit_size import FruitSize
 from station.inspection.judge import judge
 from station.inspection.press import Measured, Press
-from station.inspection.uncertainty import COMPONENTS, repeatability_at
-from station.settings.damage import Repeatability
+from station.inspection.uncertainty import COMPONENTS
 from station.vocabulary import Reason
 from tests.inspection.test_sized_limits import RECIPE, recipe_with
 
@@ -68,13 +67,3 @@ def test_a_fruit_at_its_limit_is_kept_from_pass_as_often_as_the_coverage_says():
         points = tuple(Measured(float(c), area_mm2 * c / 3, 1000 * c, 0.9) for c in range(4))
         passed += judge(replace(FRUIT, points=points, size=FruitSize(length_mm)), RECIPE).outcome == "PASS"
     assert passed / draws == pytest.approx(0.05, abs=0.015)
-
-
-def test_the_repeatability_is_interpolated_and_held_beyond_its_ends():
-    measured = (Repeatability(closing_mm=2.0, relative=0.1), Repeatability(closing_mm=4.0, relative=0.06))
-    assert [repeatability_at(closing, measured) for closing in (1, 2, 3, 4, 9)] == pytest.approx(
-        [0.1, 0.1, 0.08, 0.06, 0.06]
-    )
-    longer = (*measured, Repeatability(closing_mm=6.0, relative=0.02))
-    assert [repeatability_at(closing, longer) for closing in (1, 5, 9)] == pytest.approx([0.1, 0.04, 0.02])
-    assert [repeatability_at(closing, measured[:1]) for closing in (1, 2, 9)] == [0.1, 0.1, 0.1]

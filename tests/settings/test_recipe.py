@@ -18,6 +18,7 @@ from station.inspection.judge import early_stop, judge
 from station.inspection.press import Measured, Press
 from station.messages import settings as messages
 from station.settings import recipe_model
+from station.settings.damage import AreaUncertainty, Repeatability
 from station.settings.gripper import GripperCalibration
 from station.settings.problems import Problem, SettingsError
 from station.settings.recipe import (
@@ -39,6 +40,10 @@ PRINTABLE = "expected printable characters: no control characters, none that tur
 ONE_STEP = (
     "expected another step before this closing, a multiple of 1 mm from 0.5 to below {below_mm} mm: no fruit passes by "
     "one image alone (make steps.step_mm smaller or the closing larger), got {got}"
+)
+NO_ROOM = (
+    "expected room below area_mm2, {limit} mm²: with a guard band of {guard}% on either side no fruit would pass "
+    "(lower it, raise area_mm2, or lower damage.uncertainty), got {got}"
 )
 
 # What is changed in the small recipe, by regular expression, and what has to be said then.
@@ -264,6 +269,19 @@ BAD = {
         "area_mm2: 100\n      least_area_mm2: 100",
         ["25: damage.area[0].least_area_mm2: expected less than area_mm2, 100 mm², got 100"],
     ),
+    "no room between the least area and the largest": (
+        r"area_mm2: 100",
+        "area_mm2: 100\n      least_area_mm2: 85",
+        [f"25: damage.area[0].least_area_mm2: {NO_ROOM.format(limit=100, guard=8.2, got=85)}"],
+    ),
+    "a guard band as large as the area": (
+        r"growth_mm2_per_mm: 30",
+        (
+            "growth_mm2_per_mm: 30\n  uncertainty:\n    repeatability:\n"
+            "      - {closing_mm: 4, relative: 0.7}\n      - {closing_mm: 8, relative: 0.5}"
+        ),
+        [f"23: damage.area[0].least_area_mm2: {NO_ROOM.format(limit=100, guard=115.1, got=0)}"],
+    ),
     "coverage unordered": (
         r"growth_mm2_per_mm: 30",
         (
@@ -294,6 +312,7 @@ GOOD = {
     "steps up to the limit": (r"8\.5", "8"),
     "steps up to shut": (r"start: onset", "start: width\n  start_width_mm: 8"),
     "areas equal": (r"area_mm2: 150", "area_mm2: 100"),
+    "just room above the least area": (r"area_mm2: 100", "area_mm2: 100\n      least_area_mm2: 84.7"),
     "early stop at the thresholds": (
         r"area_mm2: 160\n  growth_mm2_per_mm: 40",
         "area_mm2: 150\n  growth_mm2_per_mm: 30",
@@ -383,6 +402,38 @@ def test_the_limits_that_decide(small, write, decided_by, deciding_mm, passing_m
 
 def test_the_guard_band_has_the_coverage_of_a_normal_distribution(small, write):
     assert load_recipe(write(small)).damage.uncertainty.factor == pytest.approx(1.6449, abs=1e-4)
+
+
+def test_the_repeatability_is_interpolated_and_held_beyond_its_ends():
+    measured = (Repeatability(closing_mm=2.0, relative=0.1), Repeatability(closing_mm=4.0, relative=0.06))
+    longer = (*measured, Repeatability(closing_mm=6.0, relative=0.02))
+    for repeatability, expected in {
+        measured: {1: 0.1, 2: 0.1, 3: 0.08, 4: 0.06, 9: 0.06},
+        longer: {1: 0.1, 5: 0.04, 9: 0.02},
+        measured[:1]: {1: 0.1, 2: 0.1, 9: 0.1},
+    }.items():
+        uncertainty = AreaUncertainty(repeatability=repeatability)
+        found = [uncertainty.repeatability_at(closing) for closing in expected]
+        assert found == pytest.approx([*expected.values()])
+
+
+@pytest.mark.parametrize(("least_mm2", "passing"), [(70, False), (66.2, False), (66.1, True)])
+def test_a_limit_with_no_room_above_its_least_area_is_refused_since_no_raspberry_passes(
+    write, root, least_mm2, passing
+):
+    """A fruit in the middle of the room, its press without any uncertainty but the repeatability."""
+    text = (root / "recipes" / "raspberry.yaml").read_text(encoding="utf-8")
+    path = write(text.replace("least_area_mm2: 31", f"least_area_mm2: {least_mm2}"))
+    shipped, area_mm2 = load_recipes()["raspberry"], 72.07
+    limit = shipped.damage.area[0].model_copy(update={"least_area_mm2": least_mm2})
+    recipe = shipped.model_copy(update={"damage": shipped.damage.model_copy(update={"area": (limit,), "size": None})})
+    points = tuple(Measured(float(at), area_mm2 * at / 3, round(1000 * at), 0.9) for at in range(4))
+    assert (judge(Press(24.0, 0.0, points), recipe).outcome == "PASS") == passing
+    if passing:
+        assert load_recipe(path).damage.area[0].least_area_mm2 == least_mm2
+    else:
+        with pytest.raises(SettingsError, match=r"damage\.area\[0\]\.least_area_mm2: expected room below"):
+            load_recipe(path)
 
 
 def test_what_a_recipe_does_not_say_is_left_out_of_its_values(small, write):

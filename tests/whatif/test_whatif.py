@@ -73,7 +73,7 @@ def test_a_curve_that_was_stopped_early_does_not_tell_what_would_have_come(orcha
     replayed = replay(stored, orchard.recipe, further)
     assert replayed.after == "UNDECIDABLE"
     assert replayed.why == messages.CURVE_STOPPED(reached_mm=stored.press.points[-1].closing_mm)
-    stricter = changed(further, damage__area__0__area_mm2=62.0)
+    stricter = changed(further, damage__area__0__area_mm2=62.0, damage__area__0__least_area_mm2=20.0)
     assert replay(stored, orchard.recipe, stricter).after == "FAIL", "what is proven stands, whatever would have come"
     near = changed(further, damage__area__0__area_mm2=stored.press.points[3].area_mm2 + 1)
     replayed = replay(stored, orchard.recipe, near)
