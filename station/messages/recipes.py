@@ -80,6 +80,11 @@ SAME = define(
     "recipe {recipe}: the file is the same as revision {revision}, which is approved already; change it first",
     revision=Number(),
 )
+NOT_FOR_INSPECTIONS = define(
+    "recipe.not_for_inspections",
+    "recipe {recipe}: segmentation.method is paper, which gives no confidence, so no fruit would pass; set it to "
+    "robust, and use paper in `station analyze` and `station study`",
+)
 ANOTHER_WAITS = define(
     "recipe.another_waits",
     "recipe {recipe}: revision {revision} of {author} waits for approval; let it be approved or rejected first",

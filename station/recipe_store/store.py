@@ -48,11 +48,13 @@ class RecipeStore(RecipeReader):
         """Store the recipe's file as a draft for another person to approve.
 
         Raises:
-            BadInputError: there is no valid file of that recipe.
+            BadInputError: there is no valid file of that recipe, or no fruit passes by its method.
             RecipeStoreError: it is approved already, or another person's draft waits.
         """
         with locked(self._home):
             file = self.state(name).valid_file
+            if file.recipe.segmentation.method == "paper":
+                raise BadInputError(messages.NOT_FOR_INSPECTIONS(recipe=name))
             self._started()
             with direct_transaction(self._records) as connection:
                 return submit(connection, file.text, file.recipe, person)

@@ -153,7 +153,8 @@ class Segmentation(Settings):
     method: Literal["robust", "paper"] = setting(
         "robust",
         title="Method",
-        description="`robust` is the station's own method, `paper` the published pipeline as printed.",
+        description="`robust` is the station's own method, `paper` the published pipeline as printed, "
+        "for analyses and studies: it gives no confidence, and inspections refuse it.",
     )
     paper: PaperParameters = setting(
         PaperParameters(),

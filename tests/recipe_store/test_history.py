@@ -60,6 +60,15 @@ def test_a_draft_is_in_force_once_another_person_approves_it(begun, station, doe
     assert station("audit", "verify")[0] == 0
 
 
+def test_the_papers_method_is_for_analyses_and_is_not_submitted_for_inspections(begun, station, site, home):
+    place = site / "strawberry.yaml"
+    place.write_text(place.read_text().replace("method: robust", "method: paper"))
+    assert station("recipes", "check", place)[0] == 0
+    code, told = station("recipes", "submit", "strawberry", "--who", "Ida", "--reason", "x")
+    assert (code, told) == (2, str(recipes.NOT_FOR_INSPECTIONS(recipe="strawberry")))
+    assert [each.number for each in book_of(site, home)._store.history("strawberry")] == [1]
+
+
 def test_a_hand_edit_is_noticed_shown_and_not_live(begun, station, site, home):
     book = book_of(site, home)
     file = site / "strawberry.yaml"

@@ -8,6 +8,7 @@ from station.errors import BadInputError
 from station.inspection.deadlines import LONGEST_S, Deadlines, Late, Pace, deadlines, late
 from station.inspection.states import State
 from station.messages.operation import DEADLINE_TOO_SHORT
+from station.messages.recipes import NOT_FOR_INSPECTIONS
 from station.runtime.cycle.inspection import Inspection
 from station.runtime.devices.rig import Cell
 from station.settings.arm import ArmSettings, PoseName
@@ -45,11 +46,14 @@ class Pacing:
         return deadlines(recipe, pace)
 
     def check(self, recipe: Recipe) -> None:
-        """Check that the site's deadline leaves time for the longest way of a recipe that is to become active.
+        """Check that fruit can pass by a recipe that is to become active, within the site's deadline.
 
         Raises:
-            BadInputError: it does not, or an inspection would take longer than the PLC can be told.
+            BadInputError: no fruit passes by its method, the deadline leaves no time for its longest way, or an
+                inspection would take longer than the PLC can be told.
         """
+        if recipe.segmentation.method == "paper":  # of a file that was adopted: nobody may submit it
+            raise BadInputError(NOT_FOR_INSPECTIONS(recipe=recipe.name))
         needed_s = self.expected(recipe).longest_path_s
         allowed_s = self._configuration.service.inspection_deadline_s
         if allowed_s is not None and allowed_s < needed_s:

@@ -1,6 +1,7 @@
 """What the PLC interface asks beside a fruit's outcome: doubled triggers, refusals, commands, the state."""
 
 import asyncio
+import json
 
 import pytest
 
@@ -10,6 +11,7 @@ from station.inspection.alarm_table import ALARMS, AlarmId
 from station.inspection.deadlines import deadlines
 from station.inspection.states import State
 from station.messages import readiness
+from station.messages.recipes import NOT_FOR_INSPECTIONS
 from station.runtime.cycle import pacing
 from station.vocabulary import Reason, Refusal
 
@@ -126,6 +128,21 @@ def test_a_deadline_under_the_recipes_longest_way_is_refused_with_the_remedy(ben
         async with bench(inspection_deadline_s=1.0) as cell:
             with pytest.raises(AssertionError, match=r"deadline_too_short.*'allowed_s': 1\.0"):
                 await cell.choose("strawberry")
+
+    asyncio.run(scenario())
+
+
+def test_the_papers_method_by_which_no_fruit_passes_is_refused_for_inspections(bench, settings_file, tmp_path):
+    file, place = settings_file(), tmp_path / "recipes" / "blueberry.yaml"
+    recipe = json.loads(place.read_text())
+    recipe["segmentation"]["method"] = "paper"
+    place.write_text(json.dumps(recipe))
+
+    async def scenario():
+        async with bench(file) as cell:
+            done = await cell.line.order(CommandName.CHANGE_RECIPE, 2)
+            assert done.why == NOT_FOR_INSPECTIONS(recipe="blueberry")
+            await cell.choose("strawberry")
 
     asyncio.run(scenario())
 
