@@ -175,9 +175,11 @@ def _case(press: Press, recipe: Recipe) -> "_Case":
         return last
     if recipe.damage.decided_by == "first_trusted":
         return decided[0]
-    # Every trusted one: the first that is not kept. Once the last is reached, one that a cut or lost edge reaches is
-    # not kept either; where the last's area may be larger than was seen, and nothing else, those before it decide.
-    not_kept = next((case for case in decided if case.findings), None)
+    # Every trusted one: the first that is not kept, of them one that proves damage before one that may be near. Once
+    # the last is reached, one that a cut or lost edge reaches is not kept either; where the last's area may be larger
+    # than was seen, and nothing else, those before it decide.
+    proven = (case for case in decided if case.proves)
+    not_kept = next(proven, next((case for case in decided if case.findings), None))
     if not_kept is None and last.reached:
         not_kept = next((case for case in cases if case.may_be_over), None)
     return not_kept or (decided[-1] if last.reached and last.may_be_larger else last)
@@ -206,6 +208,11 @@ class _Case:
         return [*damage, *_distrust(self.evidence, self.limits.recipe)]
 
     @property
+    def proves(self) -> bool:
+        """Whether damage is proven: nothing is where the press is void."""
+        return not self.void and any(finding.proves for finding in self.findings)
+
+    @property
     def reached(self) -> bool:
         """Whether the last limit's closing was reached."""
         return self.evidence.area_at(self.limits.recipe.damage.area[-1].closing_mm) is not None
@@ -230,7 +237,7 @@ class _Case:
     @property
     def decides(self) -> bool:
         """Whether damage is proven, or the last limit was reached and nothing is in doubt but how near it is."""
-        if self.void or any(finding.proves for finding in self.findings):
+        if self.void or self.proves:
             return True
         return self.reached and self._reasons <= {Reason.NEAR_LIMIT}
 
@@ -258,7 +265,7 @@ class _Case:
         """Why no further step can change the outcome; None where one can."""
         if self.void:
             return messages.STOPPED_VOID
-        if any(finding.proves for finding in self.findings):
+        if self.proves:
             return messages.STOPPED_DAMAGED
         if self.evidence.points[-1].closing_mm < self.limits.recipe.damage.area[-1].closing_mm:
             return None

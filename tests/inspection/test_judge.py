@@ -660,6 +660,17 @@ def at_both_limits(at_2: Measured, at_4: Measured, least_mm2: tuple[float, float
     return Press(35.0, 0.4, points), recipe
 
 
+@pytest.mark.parametrize(
+    ("at_4_mm2", "outcome", "reasons_of"),
+    [(98, "NO_RESULT", (Reason.NEAR_LIMIT,)), (125, "FAIL", (Reason.AREA_OVER_LIMIT,))],
+)
+def test_an_area_near_an_earlier_limit_hides_no_proof_at_a_later_one(at_4_mm2, outcome, reasons_of):
+    """As where every step is made for its curve, or the jaws close without a stop."""
+    verdict = judge(*at_both_limits(point(2.0, 49), point(4.0, at_4_mm2)))
+    assert (verdict.outcome, verdict.reasons) == (outcome, reasons_of)
+    assert {finding.closing_mm for finding in verdict.findings} == {2.0 if outcome == "NO_RESULT" else 4.0}
+
+
 def by_both_limits(at_2: Measured, at_4: Measured, least_mm2: tuple[float, float] = (0.0, 0.0)) -> str:
     """The outcome of such a strawberry."""
     return judge(*at_both_limits(at_2, at_4, least_mm2)).outcome
