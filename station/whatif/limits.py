@@ -7,6 +7,7 @@ limit's two errors on the marked fruit are counts, and no distribution of the fr
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +21,7 @@ from station.settings.recipe_model import Recipe
 
 Values = npt.NDArray[np.float64]
 Counts = npt.NDArray[np.intp]
+_Shares = TypeVar("_Shares", float, Values)
 
 CONFIDENCE = 0.95
 _LARGEST_GROWTH_MM2_PER_MM = 500.0
@@ -34,7 +36,7 @@ class Costs:
     damaged_share: float
     """Share of damaged fruit on the line, above 0 and below 1."""
 
-    def of(self, false_accepts: float, false_rejects: float) -> float:
+    def of(self, false_accepts: _Shares, false_rejects: _Shares) -> _Shares:
         """Return the cost of an average fruit, in false rejects, by the shares of damaged and sound fruit in error."""
         return self.damaged_share * self.false_accept * false_accepts + (1 - self.damaged_share) * false_rejects
 
@@ -153,15 +155,10 @@ def choose(good: Values, bad: Values, costs: Costs) -> float:
         good: least limits by which they pass, mm²; at least one of them finite.
         bad: likewise; at least one.
     """
-    steps = np.unique(np.concatenate([good, bad]))
-    steps = steps[np.isfinite(steps)]
+    steps, _ = _steps(good, bad)
     diverted, passed = errors(good, bad, steps)
-    cost = np.array([costs.of(p / len(bad), d / len(good)) for p, d in zip(passed, diverted, strict=True)])
-    # A limit anywhere from one value to the next errs alike. Beyond the last nothing is known.
-    ends = np.append(steps[1:], steps[-1])
-    cheapest = np.flatnonzero(cost <= cost.min() + 1e-12)
-    widest = max(cheapest, key=lambda place: ends[place] / steps[place])
-    return max(float(steps[widest]), math.sqrt(steps[widest] * ends[widest]))
+    cost = costs.of(passed / len(bad), diverted / len(good))
+    return float(_cheapest(steps, cost[None], np.ones(len(steps), dtype=np.bool_))[0])
 
 
 def cross_validated(good: Values, bad: Values, costs: Costs) -> tuple[int, int] | None:
@@ -172,9 +169,40 @@ def cross_validated(good: Values, bad: Values, costs: Costs) -> tuple[int, int] 
     """
     if np.isfinite(good).sum() < 2 or len(bad) < 2:
         return None
-    diverted = sum(one > choose(np.delete(good, place), bad, costs) for place, one in enumerate(good))
-    passed = sum(one <= choose(good, np.delete(bad, place), costs) for place, one in enumerate(bad))
-    return int(diverted), int(passed)
+    steps, copies = _steps(good, bad)
+    diverted, passed = errors(good, bad, steps)
+    # One row for each fruit left out: it is not counted, and its own value is a limit only where another fruit has it.
+    left_good, left_bad = good[:, None], bad[:, None]
+    without_good = costs.of(passed / len(bad), (diverted - (left_good > steps)) / (len(good) - 1))
+    without_bad = costs.of((passed - (left_bad <= steps)) / (len(bad) - 1), diverted / len(good))
+    others_good = _cheapest(steps, without_good, (copies > 1) | (left_good != steps))
+    others_bad = _cheapest(steps, without_bad, (copies > 1) | (left_bad != steps))
+    return int((good > others_good).sum()), int((bad <= others_bad).sum())
+
+
+def _steps(good: Values, bad: Values) -> tuple[Values, Counts]:
+    """Return the limits at which an error changes, ascending, and how many fruit have each."""
+    steps, copies = np.unique(np.concatenate([good, bad]), return_counts=True)
+    finite = np.isfinite(steps)
+    return steps[finite], copies[finite]
+
+
+def _cheapest(steps: Values, cost: Values, there: npt.NDArray[np.bool_]) -> Values:
+    """Return for each row of costs the limit of the least; of equal ones, the middle of the widest gap.
+
+    Args:
+        cost: of each step, shape (rows, steps).
+        there: whether a row has the step, shape (rows, steps) or (steps).
+    """
+    cost = np.where(there, cost, np.inf)
+    # A limit anywhere from one value to the next errs alike. Beyond the last nothing is known.
+    after = np.minimum.accumulate(np.where(np.isfinite(cost), steps, np.inf)[:, :0:-1], axis=1)[:, ::-1]
+    ends = np.column_stack([after, np.full(len(cost), np.inf)])
+    ends = np.where(np.isfinite(ends), ends, steps)
+    cheap = cost <= cost.min(axis=1, keepdims=True) + 1e-12
+    widest = np.where(cheap, ends / steps, 0.0).argmax(axis=1)
+    low, high = steps[widest], ends[np.arange(len(cost)), widest]
+    return np.maximum(low, np.sqrt(low * high))
 
 
 def rate_interval(happened: int, number: int) -> Interval:

@@ -1,12 +1,13 @@
 """Proposed limits from marked fruit, one for each closing, with their figures."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from station.records.marks import Mark
+from station.settings.damage import SizeOfFruit
 from station.settings.recipe_model import Recipe
 from station.whatif.limits import (
     Costs,
@@ -33,6 +34,18 @@ _RATES_TO_SHOW = (0.05, 0.01)
 """False accept rates for which the report gives the number of marked fruit that would show them."""
 
 
+class LeftOut(NamedTuple):
+    """Errors on fruit that nothing was chosen on: exponent, limit and closing are each time those of the others.
+
+    A fruit without a constraint at their closing is not counted.
+    """
+
+    good_diverted: int
+    good: int
+    bad_passed: int
+    bad: int
+
+
 @dataclass(frozen=True, slots=True)
 class Proposal:
     """The limit of the least cost at one closing."""
@@ -48,12 +61,17 @@ class Proposal:
     bad: Values
     """Least limits by which the fruit pass, for a fruit of the reference length, mm²."""
     limit_mm2: float
-    left_out: tuple[int, int] | None
-    """Good fruit diverted and bad ones passed, each by the limit of the others; None with too few."""
+    by_others: tuple[int, int] | None
+    """Good fruit diverted and bad ones passed, each by the limit of the others at this closing; None with too few."""
+    left_out: LeftOut | None = None
+    """Of the proposal of the least cost; None with too few, and of the others."""
 
     def cost(self, costs: Costs) -> float:
-        """Return the cost of an average fruit, cross-validated; the worst case if there are too few fruit."""
-        diverted, passed = self.left_out or (len(self.good), len(self.bad))
+        """Return the cost by which closings are compared, of an average fruit by the limits of the others.
+
+        That of the closing chosen by it is too small, as the least of several. With too few fruit it is the worst case.
+        """
+        diverted, passed = self.by_others or (len(self.good), len(self.bad))
         return costs.of(passed / len(self.bad), diverted / len(self.good))
 
 
@@ -65,34 +83,72 @@ def proposals(
     Args:
         own: the recipes that they were pressed by, by their hash.
     """
-    closings = {*recipe.steps.result_closings_mm, *(each.closing_mm for each in recipe.damage.area)}
-    found = [_at(closing_mm, stored, marked, own, recipe, costs) for closing_mm in sorted(closings)]
+    good = [marked[each.sequence] == "good" for each in stored]
+    fruit = {
+        closing_mm: [
+            marked_fruit(each.judged, own[each.recipe_sha256], closing_mm, good=is_good, draft=recipe)
+            for each, is_good in zip(stored, good, strict=True)
+        ]
+        for closing_mm in sorted({*recipe.steps.result_closings_mm, *(each.closing_mm for each in recipe.damage.area)})
+    }
+    return proposals_of(fruit, good, recipe.damage.size, costs)
+
+
+def proposals_of(
+    fruit: Mapping[float, Sequence[MarkedFruit | None]], good: Sequence[bool], rule: SizeOfFruit | None, costs: Costs
+) -> list[Proposal]:
+    """Propose a limit for each closing, the cheapest first, which has its errors on fruit left out.
+
+    Args:
+        fruit: at each closing, mm, in ascending order, the constraint of each marked fruit, always in the same order.
+        good: whether it is marked good.
+    """
+    found = _by_cost(fruit, good, rule, costs)
+    return [replace(each, left_out=_left_out(fruit, good, rule, costs)) for each in found[:1]] + found[1:]
+
+
+def _by_cost(
+    fruit: Mapping[float, Sequence[MarkedFruit | None]], good: Sequence[bool], rule: SizeOfFruit | None, costs: Costs
+) -> list[Proposal]:
+    found = [_at(closing_mm, seen, sum(good), rule, costs) for closing_mm, seen in fruit.items()]
     known = [each for each in found if each is not None]
     return sorted(known, key=lambda each: (each.cost(costs), each.closing_mm))
 
 
+def _left_out(
+    fruit: Mapping[float, Sequence[MarkedFruit | None]], good: Sequence[bool], rule: SizeOfFruit | None, costs: Costs
+) -> LeftOut | None:
+    """Judge each fruit by the proposal that is made without it; None where there is none."""
+    errors_of = {True: [0, 0], False: [0, 0]}
+    for place, is_good in enumerate(good):
+        others = {closing_mm: [*seen[:place], *seen[place + 1 :]] for closing_mm, seen in fruit.items()}
+        found = _by_cost(others, [*good[:place], *good[place + 1 :]], rule, costs)
+        if not found:
+            return None
+        one = fruit[found[0].closing_mm][place]
+        if one is None:
+            continue
+        (passes_from_mm2,) = np.concatenate(at_reference([one], found[0].exponent, _reference_mm(rule)))
+        passed = bool(passes_from_mm2 <= found[0].limit_mm2)
+        errors_of[is_good][0] += passed != is_good
+        errors_of[is_good][1] += 1
+    return LeftOut(*errors_of[True], *errors_of[False])
+
+
 def _at(
     closing_mm: float,
-    stored: Sequence[StoredPress],
-    marked: Mapping[int, Mark],
-    own: Mapping[str, Recipe],
-    recipe: Recipe,
+    seen: Sequence[MarkedFruit | None],
+    all_good: int,
+    rule: SizeOfFruit | None,
     costs: Costs,
 ) -> Proposal | None:
-    seen = [
-        marked_fruit(
-            each.judged, own[each.recipe_sha256], closing_mm, good=marked[each.sequence] == "good", draft=recipe
-        )
-        for each in stored
-    ]
     fruit = tuple(one for one in seen if one is not None)
     reached = sum(one.area_mm2 is not None for one in fruit if one.good)
-    all_good = sum(marked[each.sequence] == "good" for each in stored)
-    found, rule = exponent_of(fruit), recipe.damage.size
+    found = exponent_of(fruit)
     exponent = 0.0 if rule is None else rule.exponent
     if rule is not None and found is not None and abs(found.value - exponent) > _SURE * found.standard_error:
         exponent = round(min(max(found.value, 0.05), 3.0), 2)
-    good, bad = at_reference(fruit, exponent, 1.0 if rule is None else rule.reference_mm)
+    good, bad = at_reference(fruit, exponent, _reference_mm(rule))
     if reached < _KNOWN_SHARE * all_good or not np.isfinite(good).any() or not len(bad):
         return None
     return Proposal(
@@ -104,8 +160,12 @@ def _at(
         good=good,
         bad=bad,
         limit_mm2=choose(good, bad, costs),
-        left_out=cross_validated(good, bad, costs),
+        by_others=cross_validated(good, bad, costs),
     )
+
+
+def _reference_mm(rule: SizeOfFruit | None) -> float:
+    return 1.0 if rule is None else rule.reference_mm
 
 
 def figures_of(proposal: Proposal, costs: Costs) -> dict[str, Any]:
@@ -127,8 +187,8 @@ def figures_of(proposal: Proposal, costs: Costs) -> dict[str, Any]:
         "left_out": None
         if proposal.left_out is None
         else {
-            "good_diverted": _share(proposal.left_out[0], len(good)),
-            "bad_passed": _share(proposal.left_out[1], len(bad)),
+            "good_diverted": _share(proposal.left_out.good_diverted, proposal.left_out.good),
+            "bad_passed": _share(proposal.left_out.bad_passed, proposal.left_out.bad),
         },
         "cost": proposal.cost(costs),
         "bad_needed_to_show": {f"{rate:g}": fewest_fruit(rate) for rate in _RATES_TO_SHOW},

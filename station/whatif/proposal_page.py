@@ -53,7 +53,7 @@ def lines_of(figures: dict[str, Any]) -> list[str]:
     else:
         left_out = best["left_out"]
         lines.append(
-            f"each left out once, judged by the limit of the others: {_of(left_out['good_diverted'])} good diverted, "
+            f"each left out once, judged by what the others propose: {_of(left_out['good_diverted'])} good diverted, "
             f"{_of(left_out['bad_passed'])} bad passed"
         )
     needed = best["bad_needed_to_show"]

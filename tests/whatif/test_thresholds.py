@@ -28,6 +28,7 @@ from station.whatif.limits import (
     marked_fruit,
     rate_interval,
 )
+from station.whatif.proposal import proposals_of
 
 AREAS = st.lists(st.floats(1, 200), min_size=1, max_size=60).map(np.array)
 COSTS = Costs(false_accept=20, damaged_share=0.05)
@@ -71,6 +72,48 @@ def test_on_fruit_left_out_the_errors_are_not_flattered():
     assert left_out is not None
     assert inside == 1 < sum(left_out)
     assert cross_validated(good, bad[:1], COSTS) is None
+
+
+def test_the_errors_on_fruit_left_out_are_those_on_other_fruit_also_where_the_closing_was_chosen_by_chance():
+    """At five closings of equal worth, whose areas are the same truth with noise of their own."""
+    rule = find_recipe("strawberry").damage.size
+    assert rule is not None
+
+    def drawn(random, number):
+        good = [each % 3 > 0 for each in range(number)]
+        lengths = random.uniform(30, 60, number)
+        truth = np.where(good, 100, 120) * (lengths / rule.reference_mm) ** rule.exponent
+        fruit = {
+            closing_mm: [
+                MarkedFruit(is_good, area, area, length)
+                for is_good, area, length in zip(good, truth * random.lognormal(0, 0.13, number), lengths, strict=True)
+            ]
+            for closing_mm in (1.0, 2.0, 3.0, 4.0, 5.0)
+        }
+        return fruit, good
+
+    told, compared, on_others = [], [], []
+    for seed in range(16):
+        random = np.random.default_rng(seed)
+        best = proposals_of(*drawn(random, 24), rule, COSTS)[0]
+        assert best.left_out is not None
+        diverted, of_good, passed, of_bad = best.left_out
+        told.append(COSTS.of(passed / of_bad, diverted / of_good))
+        compared.append(best.cost(COSTS))
+        others = at_reference(drawn(random, 3000)[0][best.closing_mm], best.exponent, rule.reference_mm)
+        on_others.append(cost(*others, best.limit_mm2))
+    standard_error = np.std(told) / math.sqrt(len(told))
+    assert np.mean(told) > np.mean(on_others) - standard_error
+    assert np.mean(compared) < np.mean(on_others) - 2 * standard_error, "by the closing's own limits it is less"
+
+
+def test_a_fruit_without_a_constraint_at_the_closing_of_the_others_is_not_counted_among_those_left_out():
+    areas = [80.0, 85.0, 90.0, 95.0, *(80.0 + each for each in range(16)), 130.0, 140.0, 150.0]
+    good = [True] * 20 + [False] * 3
+    fruit = [MarkedFruit(is_good, area, area, None) for is_good, area in zip(good, areas, strict=True)]
+    (best,) = proposals_of({3.0: [None, *fruit[1:-1], None]}, good, None, COSTS)
+    assert best.left_out == (0, 19, 0, 2)
+    assert proposals_of({3.0: fruit[:21]}, good[:21], None, COSTS)[0].left_out is None
 
 
 def test_the_exponent_is_found_within_the_kinds():
