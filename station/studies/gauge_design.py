@@ -17,7 +17,7 @@ from station.studies.gauge_dummies import (
     measure_dummy,
     stop_mm,
 )
-from station.studies.gauge_grip import deciding_closing_mm
+from station.studies.gauge_grip import last_limit_mm
 from station.studies.gauge_twin import PART_TRUTHS, GaugeTask, Simulated, good_and_damaged_mm2, measure_part
 from station.studies.grr import GaugeStudy, Origin, analysed
 from station.studies.workers import on_this_machine
@@ -66,8 +66,8 @@ def study_on_twin(design: TwinDesign, tolerance: float | None, on_done: Callable
         good, damaged = good_and_damaged_mm2(design.fruit, design.seed)
         tolerance = damaged - good
         words = (
-            f"{tolerance:.1f} mm²: bruised fruit have {damaged:.1f} mm² at the deciding closing, the same ones sound "
-            f"{good:.1f} mm² (true areas, mean of 30)"
+            f"{tolerance:.1f} mm²: bruised fruit have {damaged:.1f} mm² at the last limit's closing, the same ones "
+            f"sound {good:.1f} mm² (true areas, mean of 30)"
         )
     facts = [*(_dummy_facts(design, made) if design.dummies else _fruit_facts(design)), ("Tolerance", words)]
     title = "firm balls" if design.dummies else design.fruit
@@ -88,7 +88,7 @@ def _measured(design: TwinDesign, on_done: Callable[[], None]) -> list[Simulated
 
 
 def _fruit_facts(design: TwinDesign) -> list[tuple[str, str]]:
-    closing_mm = deciding_closing_mm(find_recipe(design.fruit))
+    closing_mm = last_limit_mm(find_recipe(design.fruit))
     return [
         ("Parts", f"{design.parts} fruit of the twin: {design.fruit}, every second one bruised, seed {design.seed}"),
         ("Operators", f"{design.operators}: another sensor unit, gripper zero and habit each; fruit placed again"),

@@ -33,7 +33,7 @@ GoesOn = Callable[[float, Contact], bool]
 """Gets a step's closing, mm, and its contact; says whether another step is to be made."""
 
 
-def deciding_closing_mm(recipe: Recipe) -> float:
+def last_limit_mm(recipe: Recipe) -> float:
     """The closing of the recipe's last damage threshold."""
     return recipe.damage.area[-1].closing_mm
 
@@ -150,7 +150,7 @@ class Grip:
         if onset is None:
             untouched = Press(None, 0.0, ())
             return Pressed(untouched, untouched, None)
-        enough_mm = deciding_closing_mm(self._recipe) + self._recipe.steps.step_mm - self._rig.finest_step_mm
+        enough_mm = last_limit_mm(self._recipe) + self._recipe.steps.step_mm - self._rig.finest_step_mm
         press = Press(onset.width_mm + zero_mm, onset.uncertainty_mm, ())
         stopped: Press | None = None
 

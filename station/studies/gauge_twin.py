@@ -14,7 +14,7 @@ import numpy as np
 from station.inspection.judge import judge
 from station.settings.recipe import find_recipe
 from station.studies.cohort import member
-from station.studies.gauge_grip import FruitRig, Grip, deciding_closing_mm, true_area_mm2
+from station.studies.gauge_grip import FruitRig, Grip, last_limit_mm, true_area_mm2
 from station.studies.gauge_table import Measurement
 from station.twin.contact import Pose
 from station.twin.fruit import Fruit
@@ -111,23 +111,23 @@ def measure_part(task: GaugeTask) -> Simulated:
     generator = np.random.default_rng([task.seed, 103, task.part, task.operator, task.repeat])
     grip = Grip(recipe, FruitRig(fruit, pose, setup.unit, int(generator.integers(2**31))))
     pressed = grip.press(float(generator.uniform(0.0, 1.0)), setup.zero_mm)
-    deciding_mm = deciding_closing_mm(recipe)
+    limit_mm = last_limit_mm(recipe)
     areas = judge(pressed.on_to_the_threshold, recipe).areas
-    area_mm2 = next(area.area_mm2 for area in areas if area.closing_mm == deciding_mm)
-    counted_mm2 = 0.0 if pressed.late_mm is None else true_area_mm2(fruit, pose, pressed.late_mm + deciding_mm)
+    area_mm2 = next(area.area_mm2 for area in areas if area.closing_mm == limit_mm)
+    counted_mm2 = 0.0 if pressed.late_mm is None else true_area_mm2(fruit, pose, pressed.late_mm + limit_mm)
     outcome, reference = judge(pressed.as_stopped, recipe).outcome, "FAIL" if fruit.bruised else "PASS"
     return Simulated(
         Measurement(*task.names, area_mm2 or 0.0, outcome, reference),
-        (true_area_mm2(fruit, pose, deciding_mm), counted_mm2),
+        (true_area_mm2(fruit, pose, limit_mm), counted_mm2),
     )
 
 
 def good_and_damaged_mm2(fruit: str, seed: int) -> tuple[float, float]:
-    """Return true areas at the deciding closing, mean over the paper's 30 sizes: sound fruit, and the same bruised.
+    """Return true areas at the last limit's closing, mean over the paper's 30 sizes: sound fruit, and the same bruised.
 
     Their difference is the tolerance.
     """
-    closing_mm = deciding_closing_mm(find_recipe(fruit))
+    closing_mm = last_limit_mm(find_recipe(fruit))
 
     def mean(*, bruised: bool) -> float:
         members = [member(fruit, seed, number) for number in range(_TOLERANCE_FRUIT)]

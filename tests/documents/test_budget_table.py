@@ -29,7 +29,10 @@ def budget(recipe: Recipe, *, sized: bool = True) -> Budget:
 def table() -> str:
     recipes = [load_recipes()[name] for name in FRUIT]
     known, unknown = [budget(recipe) for recipe in recipes], [budget(recipe, sized=False) for recipe in recipes]
-    rows = [["share of the area, %", *(recipe.title for recipe in recipes)], ["---"] * (1 + len(recipes))]
+    rows = [
+        ["share of the area, %", *(f"{recipe.title}, {recipe.damage.deciding_closing_mm:g} mm" for recipe in recipes)],
+        ["---"] * (1 + len(recipes)),
+    ]
     rows += [
         [text, *(f"{100 * each.components[place].relative:.1f}" for each in known)]
         for place, text in enumerate(COMPONENTS.values())

@@ -15,7 +15,7 @@ from station.studies import gauge_design, gauge_dummies
 from station.studies import grr as grr_room
 from station.studies.gauge_design import TwinDesign, study_on_twin
 from station.studies.gauge_dummies import measure_dummy, stop_mm
-from station.studies.gauge_grip import deciding_closing_mm
+from station.studies.gauge_grip import last_limit_mm
 from station.studies.gauge_report import render, tolerance_percents
 from station.studies.gauge_table import Measurement, read_measurements
 from station.studies.gauge_twin import (
@@ -214,7 +214,7 @@ def test_a_flagged_reading_is_made_again(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_the_twin_s_measurement_is_the_station_s(tmp_path: Path):
-    """One press of a smooth fruit: the area at the deciding closing is near its truth, and repeats to the digit."""
+    """One press of a smooth fruit: the area at the last limit's closing is near its truth, and repeats to the digit."""
     task = GaugeTask("blueberry", 3, 0, 0, 0)
     once = measure_part(task)
     assert once == measure_part(task)
@@ -230,7 +230,7 @@ def test_the_twin_s_measurement_is_the_station_s(tmp_path: Path):
     assert counted != counted_again
     assert min(counted, counted_again) > laid  # the first contact is seen late, so the fruit is pressed further
     assert measured.area_mm2 == pytest.approx(counted, rel=0.15)
-    assert deciding_closing_mm(find_recipe("blueberry")) == 3
+    assert last_limit_mm(find_recipe("blueberry")) == 3
 
 
 def test_operators_differ_and_every_second_fruit_is_bruised():
