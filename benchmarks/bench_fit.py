@@ -41,9 +41,10 @@ ROOT = Path(__file__).resolve().parents[1]
 BEFORE, BEFORE_DATE = 171, "2026-11-22"
 """Numbers of the method, counted as `fixed.py` counts, before there was a fit."""
 COST = """
-The data sets have two parts: one to fit on, and one held back, on which nothing is chosen. Real presses and real
-backgrounds are split into even and odd numbers; the twin's presses have seeds of their own in each part. All images are
-at the method's working size. Border contacts and real presses are measured one by one; fruit and soft bodies are
+The data sets have two parts: one to fit on, and one for validation. A value is taken only where both gain, so that the
+figures of both are too good by what that choice is worth; neither is a test. Real presses and real backgrounds are
+split into even and odd numbers; the twin's presses have seeds of their own in each part. All images are at the method's
+working size. Border contacts and real presses are measured one by one; fruit and soft bodies are
 followed from step to step, from before the first touch.
 
 | data set | what it shows |
@@ -80,12 +81,12 @@ seeds.
 
 
 def evaluate(runner: Runner) -> None:
-    """Write the shipped constants' results on the part held back; `--check` alone prints both parts."""
+    """Write the shipped constants' results on the part for validation; `--check` alone prints both parts."""
     fitted = weighted(costs(runner.shipped(0), runner.parts[0]), runner.parts[0])
     lines = [
         COST.strip(),
         "",
-        f"On the part to fit on the cost is {fitted:.4f}; on the one held back:",
+        f"On the part to fit on the cost is {fitted:.4f}; on the one for validation:",
         "",
         *document.evaluation_table(runner.shipped(1), runner.parts[1]),
     ]
@@ -156,7 +157,7 @@ def fit(runner: Runner, cache: Path) -> None:
     lines = [
         "Coordinate search on the part to fit on, over the constants of origin `fit` that gain a standard error when",
         "changed by a fifth: 0.7, 0.85, 1.2 and 1.4 times the value, in two rounds at most; a move has to gain more",
-        "than two standard errors. Constants are changed by hand, and only where the part held back gains as well.",
+        "than two standard errors. Constants are changed by hand, and only where the part for validation gains too.",
         "",
         *found_table(runner, moved),
     ]
@@ -192,7 +193,7 @@ def check(runner: Runner, changes: list[str]) -> None:
                 f"{change}: the value is no number; write {name}={known[key]:g} or another number"
             ) from error
         changed = trial(key, value, changed)
-    for part, name in enumerate(("to fit on", "held back")):
+    for part, name in enumerate(("to fit on", "validation")):
         before = runner.shipped(part)
         print(f"\n{name}")
         if not changes:
@@ -222,7 +223,7 @@ def main() -> None:
     parser.add_argument("--check", nargs="*", metavar="NAME=VALUE", help="print what changes cost; write nothing")
     wanted = parser.parse_args()
     cv2.setNumThreads(1)
-    parts = [groups(part, wanted.images, wanted.cache) for part in ("fit", "held back")]
+    parts = [groups(part, wanted.images, wanted.cache) for part in ("fit", "validation")]
     with Runner(parts, wanted.processes) as runner:
         if wanted.check is not None:
             check(runner, wanted.check)

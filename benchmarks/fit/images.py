@@ -1,6 +1,6 @@
 """Images of the fit's data sets that are rendered for it: at the working size, with the truth of each.
 
-All are made of a seed; `parts.py` says which seeds are fitted on and which are held back.
+All are made of a seed; `parts.py` has the seeds to fit on and those for validation.
 """
 
 from dataclasses import replace

@@ -1,6 +1,7 @@
-"""Data sets of the fit in two parts, one to fit on and one held back: rendered once, and cached.
+"""Data sets of the fit in two parts, one to fit on and one for validation: rendered once, and cached.
 
-Nothing is chosen on the part that is held back. The cache's files carry a hash of the code that renders them.
+A value is taken only where both gain, so neither is a test. The cache's files carry a hash of the code that
+renders them.
 """
 
 import hashlib
@@ -36,7 +37,7 @@ RENDERING = (
 )
 """Code on which the rendered images depend."""
 
-Part = Literal["fit", "held back"]
+Part = Literal["fit", "validation"]
 SEEDS: dict[Part, dict[str, int]] = {
     "fit": {
         "fruit": 0,
@@ -49,7 +50,7 @@ SEEDS: dict[Part, dict[str, int]] = {
         "unit": 33000,
         "noise": 1,
     },
-    "held back": {
+    "validation": {
         "fruit": 2600,
         "bruised": 22800,
         "soft": 7000,
@@ -88,17 +89,17 @@ def groups(part: Part, images: Path, cache: Path) -> Groups:
     """Read the data sets of one part, and render those that the cache does not have.
 
     Args:
-        part: to fit on, or held back.
+        part: to fit on, or for validation.
         images: the folder of real images.
         cache: the cache's folder.
     """
     seeds = SEEDS[part]
-    odd = part == "held back"
+    odd = part == "validation"
     version = _version(images)
 
     def data(name: str, make: Callable[[], list[PressData]]) -> list[PressData]:
         began = time.monotonic()
-        found = cached(f"{name}-{part.replace(' ', '-')}", make, cache, version)
+        found = cached(f"{name}-{part}", make, cache, version)
         if (took_s := time.monotonic() - began) > 5:
             report(f"{name}, {part}: rendered in {took_s:.0f} s")
         return found

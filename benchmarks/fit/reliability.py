@@ -174,8 +174,8 @@ def twin_areas(job: tuple[str, int, bool]) -> list[list[Area]]:
 
 
 def twin_jobs() -> list[tuple[str, int, bool]]:
-    """Every kind with its held-back seeds, sound and bruised."""
-    seeds = SEEDS["held back"]
+    """Every kind with seeds of the part for validation and next to it, sound and bruised."""
+    seeds = SEEDS["validation"]
     sets = ((on_the_twin.FRUITS, "fruit"), (on_the_twin.BRUISED_FRUITS, "bruised"))
     return [
         (kind, seeds[name] + _SEEDS_APART * number, name == "bruised")
@@ -209,17 +209,17 @@ def counted(areas: Sequence[Area]) -> Count:
     return Count(len(areas), len(judged), sum(one.error > LARGE_ERROR for one in judged))
 
 
-def reliability(held_back: Groups, images: Path, processes: int) -> list[str]:
+def reliability(validation: Groups, images: Path, processes: int) -> list[str]:
     """The reliability's section, and its picture.
 
     Args:
-        held_back: the part on which nothing was fitted.
+        validation: the part for validation.
         images: the folder of real images.
         processes: how many.
     """
     softs = [kind.replace("_", " ") for kind in KINDS]
     _shared["real"] = perturbed(images / "digit_presses")
-    _shared["soft"] = {name: held_back[name] for name in softs}
+    _shared["soft"] = {name: validation[name] for name in softs}
     areas: list[dict[str, list[Area]]] = []
     with ProcessPoolExecutor(processes) as pool:
         for least, found in zip(LEAST_CONFIDENCES, pool.map(_measured, LEAST_CONFIDENCES), strict=True):
@@ -259,9 +259,10 @@ def _lines(counts: Mapping[str, Sequence[Count]], areas: Sequence[Mapping[str, S
         "interval, by the least confidence of the recipe; and the share of contacts that is judged. Real: all 30",
         "presses of the ball under each perturbation. The 390 areas are of 30 presses only, so the interval is too",
         "narrow. Brightness changes in the frame alone, as light ages; all else in frame and reference alike, since it",
-        "is the camera, the storage or the geometry. The twin's fruit, sound and bruised, have seeds on which nothing",
-        "was chosen, and are measured as by the station: three frames a step, doubted as far as they disagree.",
-        "Soft bodies are the part held back: each image is the mean of three frames, whose agreement is not used.",
+        "is the camera, the storage or the geometry. The twin's fruit, sound and bruised, have seeds of the part for",
+        "validation and next to it. They are measured as by the station: three frames a step, doubted as far as they",
+        "disagree. Soft bodies are the part for validation: each image is the mean of three frames, whose agreement is",
+        "not used.",
         "",
         "| least confidence | " + " | ".join(f"{title}: wrong | judged" for title in titles.values()) + " |",
         "|---" * 7 + "|",

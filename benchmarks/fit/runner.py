@@ -20,7 +20,7 @@ class Runner:
     """Worker processes, forked so that the images lie in memory once.
 
     Args:
-        parts: the data sets to fit on, and those held back.
+        parts: the data sets to fit on, and those for validation.
         processes: how many; 1 measures in this process.
     """
 
@@ -45,7 +45,7 @@ class Runner:
         Args:
             name: for the progress.
             trials: variants of the method.
-            part: 0 to fit on, 1 held back.
+            part: 0 to fit on, 1 for validation.
             base: on the same part; saves the measuring of what the trials do not change.
         """
         jobs = [(part, trial, base) for trial in trials]

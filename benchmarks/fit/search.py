@@ -73,14 +73,14 @@ def found_table(runner: Runner, moved: dict[str, float]) -> list[str]:
         runner.run(f"found values, part {part + 1}", [*alone, together], part, Base(Trial(), base[part]))
         for part in both
     ]
-    lines = ["| constant | shipped | found | cost, fit | cost, held back |", "|---|---|---|---|---|"]
+    lines = ["| constant | shipped | found | cost, fit | cost, validation |", "|---|---|---|---|---|"]
     rows = [(f"`{n}`", f"{getattr(CONSTANTS, n):g}", f"{value:.4g}") for n, value in moved.items()]
     for number, row in enumerate([*rows, ("all together", "", "")]):
         effects = [runner.effect(runs[part][number], base[part], part) for part in both]
         lines.append(f"| {' | '.join(row)} | " + " | ".join(f"{e:+.4f} ± {error:.4f}" for e, error in effects) + " |")
     lines += [
         "",
-        "| data set | shipped, fit | found, fit | shipped, held back | found, held back |",
+        "| data set | shipped, fit | found, fit | shipped, validation | found, validation |",
         "|---|---|---|---|---|",
     ]
     last = [scores[-1] for scores in runs]

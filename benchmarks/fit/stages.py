@@ -7,12 +7,12 @@ from station.vision.robust import STAGES
 
 
 def stages_table(runner: Runner) -> list[str]:
-    """The stages' table, on the part to fit on and the part held back together."""
+    """The stages' table, on the part to fit on and the part for validation together."""
     trials = [Trial(), *(Trial(without=frozenset({stage})) for stage in STAGES)]
     runs = [runner.run(f"stages, part {part + 1}", trials, part) for part in range(len(runner.parts))]
     names = list(runner.parts[0])
     lines = [
-        "| left out | " + " | ".join(names) + " | all: fit | all: held back |",
+        "| left out | " + " | ".join(names) + " | all: fit | all: validation |",
         "|---" * (len(names) + 3) + "|",
     ]
     base = [scores[0] for scores in runs]
