@@ -19,10 +19,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from station.binomial import clopper_pearson
 from station.settings.segmentation import PaperParameters
 from station.studies import figures
 from station.studies.cohort import PAPER_FAILURES, member
-from station.studies.failure import interval
 from station.studies.folder import Identity, identity_of
 from station.studies.gauge_design import TwinDesign, study_on_twin
 from station.studies.gauge_figures import components_plot, measurements_plot
@@ -73,7 +73,7 @@ def first(study: Study, number: int) -> Study:
 
 def percent(count: int, of: int) -> str:
     """A share with its interval."""
-    low, high = interval(count, of)
+    low, high = clopper_pearson(count, of)
     return f"{count} of {of}: {count / of:.1%} ({low:.1%} to {high:.1%})"
 
 

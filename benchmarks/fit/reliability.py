@@ -68,10 +68,6 @@ def _shifted(image: Image, _: np.random.Generator) -> Image:
     return np.asarray(cv2.warpAffine(image, moved, size, borderMode=cv2.BORDER_REPLICATE), np.uint8)
 
 
-def _turned(image: Image, _: np.random.Generator) -> Image:
-    return np.asarray(cv2.rotate(image, cv2.ROTATE_180), np.uint8)
-
-
 def _scaled(image: Image, _: np.random.Generator, *, scale: float) -> Image:
     return np.asarray(cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.uint8)
 

@@ -7,9 +7,8 @@ the areas are the same within rounding, and a whole data set is measured in seco
 import csv
 import hashlib
 import pickle
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -120,12 +119,3 @@ def in_processes(parts: Sequence[Callable[[], DataSet]]) -> DataSet:
 
 def _call(part: Callable[[], DataSet]) -> DataSet:
     return part()
-
-
-def twin_sets(*, held_back: bool) -> Iterator[tuple[str, Callable[[], DataSet]]]:
-    """The twin's data sets, of seeds to fit on or held back."""
-    fruit, bruised, soft = ((2600, 22800, 7000), (0, 20000, 5000))[not held_back]
-    yield "fruit", partial(fruit_presses, fruit, bruised=False)
-    yield "bruised", partial(fruit_presses, bruised, bruised=True)
-    softs = [partial(soft_presses, range(soft + part, soft + part + 3)) for part in (0, 3)]
-    yield "soft", partial(in_processes, softs)

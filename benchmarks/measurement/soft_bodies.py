@@ -134,12 +134,6 @@ def with_jpeg(images: Sequence[Image], quality: int) -> list[Image]:
     return [as_jpeg(image, quality) for image in images]
 
 
-def press_with_jpeg(press: SoftPress, quality: int) -> SoftPress:
-    """A press whose references and frames were stored as JPEG."""
-    steps = [step._replace(frames=with_jpeg(step.frames, quality)) for step in press.steps]
-    return press._replace(references=with_jpeg(press.references, quality), steps=steps)
-
-
 def press_with_video(press: SoftPress, codec: Codec = "mp4v", quality: int | None = None) -> SoftPress:
     """A press stored as one video, references first."""
     images = [*press.references, *(frame for step in press.steps for frame in step.frames)]

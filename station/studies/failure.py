@@ -1,10 +1,9 @@
-"""Failure definition of a sample, and the interval of a failure rate. The paper gives no definition in numbers."""
+"""Failure definition of a sample. The paper gives no definition in numbers."""
 
 from collections.abc import Sequence
 from enum import StrEnum
 
 import numpy as np
-from scipy.special import betaincinv
 
 LARGEST_FALL = 0.10
 LARGEST_ERROR = 0.50
@@ -64,15 +63,3 @@ def image_at(closings_mm: Sequence[float], result_closings_mm: Sequence[float]) 
     """Return the image nearest to each of the results' closings."""
     closings = np.asarray(closings_mm, float)
     return [int(np.argmin(np.abs(closings - wanted))) for wanted in result_closings_mm]
-
-
-def interval(count: int, of: int) -> tuple[float, float]:
-    """Return the 95 % interval of a share, after Clopper and Pearson (Biometrika 26 (1934) 404): never too narrow.
-
-    Args:
-        count: number of cases.
-        of: number of trials, at least 1.
-    """
-    low = float(betaincinv(count, of - count + 1, 0.025)) if count else 0.0
-    high = float(betaincinv(count + 1, of - count, 0.975)) if count < of else 1.0
-    return low, high

@@ -2,10 +2,11 @@
 
 from importlib.metadata import version
 
+from station.binomial import clopper_pearson
 from station.charts.report import data_uri, templates
 from station.studies import figures
 from station.studies.cohort import PAPER_FAILURES
-from station.studies.failure import DEFINITION, Cause, image_at, interval
+from station.studies.failure import DEFINITION, Cause, image_at
 from station.studies.folder import StudyFolder, identity_of
 from station.studies.sample import Task, segmentation_of
 from station.studies.study import Study, summary
@@ -16,7 +17,7 @@ PAPER_SAMPLES = 30
 
 def share(count: int, of: int) -> str:
     """Describe the share of cases in trials with its 95 % interval."""
-    low, high = interval(count, of)
+    low, high = clopper_pearson(count, of)
     return f"{count / of:.1%} ({low:.1%} to {high:.1%})"
 
 

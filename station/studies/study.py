@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from station.binomial import clopper_pearson
 from station.studies.cohort import RESULT_CLOSINGS_MM
-from station.studies.failure import Cause, failures, image_at, interval
+from station.studies.failure import Cause, failures, image_at
 from station.studies.folder import StudyFolder, identity_of
 from station.studies.sample import SampleResult, Task, measure_sample
 from station.studies.workers import on_cluster, on_this_machine
@@ -114,7 +115,7 @@ def summary(study: Study) -> dict[str, object]:
     """Return the content of `summary.json`; the same for the same cohort, method and program."""
     request, samples = study.request, study.samples
     number = len(samples)
-    low, high = interval(study.failed, number)
+    low, high = clopper_pearson(study.failed, number)
     later = sum(map(bool, study.later_causes))
     return {
         "fruit": request.fruit,

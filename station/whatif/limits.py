@@ -12,6 +12,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from station.binomial import clopper_pearson
 from station.inspection.evidence import Evidence
 from station.inspection.judge import early_stop, judge
 from station.inspection.press import Press
@@ -206,15 +207,8 @@ def _cheapest(steps: Values, cost: Values, there: npt.NDArray[np.bool_]) -> Valu
 
 
 def rate_interval(happened: int, number: int) -> Interval:
-    """Return the confidence interval of the rate of cases in trials (Clopper and Pearson, Biometrika 26 (1934) 404)."""
-    if not number:
-        return Interval(None, None)
-    from scipy.special import betaincinv  # noqa: PLC0415 (it takes long to load, and each start of the pages waits)
-
-    beyond, not_happened = (1 - CONFIDENCE) / 2, number - happened
-    low = betaincinv(happened, not_happened + 1, beyond) if happened else 0.0
-    high = betaincinv(happened + 1, not_happened, 1 - beyond) if not_happened else 1.0
-    return Interval(float(low), float(high))
+    """Return the confidence interval of the rate of cases in trials."""
+    return Interval(*clopper_pearson(happened, number)) if number else Interval(None, None)
 
 
 def fewest_fruit(rate: float) -> int:

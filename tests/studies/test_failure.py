@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom
 
+from station.binomial import clopper_pearson
 from station.studies.cohort import FRUITS, RESULT_CLOSINGS_MM, member, paper_sizes
-from station.studies.failure import Cause, failures, interval
+from station.studies.failure import Cause, failures
 from station.twin.fruit import Kind
 
 CLOSINGS = [-1.0, 0.0, 1.0, 2.0, 3.0, 4.0]
@@ -83,7 +84,7 @@ def test_the_ball_is_closed_to_the_papers_widths():
 @settings(max_examples=50, deadline=None)
 def test_an_interval_holds_what_is_not_surprising(of, data):
     count = data.draw(st.integers(0, of))
-    low, high = interval(count, of)
+    low, high = clopper_pearson(count, of)
     assert 0 <= low <= count / of <= high <= 1
     if count:
         assert binom.sf(count - 1, of, low) == pytest.approx(0.025, rel=1e-3)
