@@ -38,20 +38,28 @@ def reset(work: Work) -> None:
     work.update_journal(epoch=(work.state.journal.epoch + 1) % 2**32)
 
 
-DISARMED, RELEASED, ARMED = Arming.DISARMED, Arming.RELEASED, Arming.ARMED
+RELEASED, ARMED = Arming.RELEASED, Arming.ARMED
+
+
+def _inhibited(mode: Arming) -> tuple[Row, ...]:
+    return (
+        row(mode, Signal.ENABLE_OFF, to=RELEASED),
+        row(mode, Signal.ENABLE_ON),
+        row(mode, Signal.PLC_SILENT, silent),
+        row(mode, Signal.WRITER_LOST, count_loss),
+    )
+
 
 ARMING_ROWS = (
-    row(DISARMED, Signal.ENABLE_OFF, to=RELEASED),
-    row(DISARMED, Signal.ENABLE_ON),
-    row(DISARMED, Signal.PLC_SILENT, silent),
-    row(DISARMED, Signal.WRITER_LOST, count_loss),
+    *_inhibited(Arming.DISARMED),
+    *_inhibited(Arming.WITHDRAWN),
     row(RELEASED, Signal.ENABLE_ON, to=ARMED),
     row(RELEASED, Signal.ENABLE_OFF),
     row(RELEASED, Signal.PLC_SILENT, silent),
     row(RELEASED, Signal.WRITER_LOST, count_loss),
     row(ARMED, Signal.ENABLE_OFF, to=RELEASED),
-    row(ARMED, Signal.PLC_SILENT, silent, to=DISARMED),
-    row(ARMED, Signal.WRITER_LOST, writer_lost, to=DISARMED),
+    row(ARMED, Signal.PLC_SILENT, silent, to=Arming.WITHDRAWN),
+    row(ARMED, Signal.WRITER_LOST, writer_lost, to=Arming.WITHDRAWN),
 )
 
 LOT_ROWS = (

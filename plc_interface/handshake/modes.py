@@ -17,7 +17,9 @@ class Arming(StrEnum):
     """The enable bit."""
 
     DISARMED = "disarmed"
-    """Enable has to be given anew: written 0, then 1."""
+    """After a start of the interface: enable has to be given anew, written 0, then 1."""
+    WITHDRAWN = "withdrawn"
+    """As DISARMED, because the armed PLC's heartbeat or connection was lost."""
     RELEASED = "released"
     """Enable was written 0."""
     ARMED = "armed"

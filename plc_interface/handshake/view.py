@@ -15,6 +15,7 @@ STATION_LOST_CODE = 1000
 """In `error_code` while the station does not answer; its alarms have the numbers below."""
 
 _STATUS, _MORE_STATUS = BY_NAME["status"], BY_NAME["more_status"]
+_INHIBITED = {Arming.DISARMED, Arming.WITHDRAWN}
 _FLAGS, _REASONS = BY_NAME["result_flags"], BY_NAME["result_reasons"]
 _OUTCOMES, _REFUSALS = BY_NAME["result_outcome"], BY_NAME["last_refusal"]
 
@@ -34,6 +35,7 @@ def line(state: State, counters: Mapping[str, int], faults: tuple[LineFault, ...
         plc_connected=state.writer,
         plc_alive=state.watched,
         enabled=state.arming is Arming.ARMED,
+        enable_withdrawn=state.arming is Arming.WITHDRAWN,
         waiting=len(state.queue),
         counters={**state.counters, **counters},
         faults=(*(LineFault(part="handshake", what=fault.message) for fault in state.faults), *faults),
@@ -59,7 +61,7 @@ def _status(state: State) -> dict[str, Value]:
         "waiting_results": len(state.queue),
         "error_code": station.error_code if station else STATION_LOST_CODE,
         **alarm_values(station.alarms if station else 0),
-        "more_status": _MORE_STATUS.flags(["enable_inhibited"] if state.arming is Arming.DISARMED else []),
+        "more_status": _MORE_STATUS.flags(["enable_inhibited"] if state.arming in _INHIBITED else []),
         "last_refusal": _REFUSALS.code(state.last_refusal.value) if state.last_refusal else 0,
         "last_refused_trigger_id": state.last_refused_id,
         "latched_lot_checksum": lot_checksum(journal.lot),

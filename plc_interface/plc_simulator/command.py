@@ -148,6 +148,7 @@ async def _run(program: LineProgram, scanner: Scanner, nest: Nest, pace: Pace, c
             while not running.done():  # Python 3.11's wait_for loses a cancellation that comes with its answer
                 running.cancel()
                 await asyncio.wait([running], timeout=_ENDING_S)
+        await simulator.release()
         console.print(summary_line(simulator.summary))
         if not running.cancelled():
             running.result()

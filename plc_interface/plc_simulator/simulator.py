@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from plc_interface.plc_simulator.nest import LaidFruit, Nest
-from plc_interface.plc_simulator.program import Decision, LineProgram, Passage, Values
+from plc_interface.plc_simulator.program import Decision, LineProgram, Outputs, Passage, Values
 from plc_interface.plc_simulator.scan import Scanner
 from plc_interface.registers.alarms import active_alarms
 
@@ -54,6 +54,7 @@ class LineSimulator:
         self.on_scan: Callable[[str], None] = lambda _activity: None
         """Receives after each scan the line's activity, or its obstacle."""
         self.summary = Summary()
+        self._written: Outputs | None = None
 
     async def run(self, count: int | None) -> Summary:
         """Run until `count` fruits are decided and the last result is acknowledged; None for until cancelled.
@@ -82,6 +83,7 @@ class LineSimulator:
             )
             if self._program.cut_wanted:
                 self._scanner.cut()
+            self._written = outputs
             inputs = await self._scanner.exchange(outputs)
             self.on_scan(self._scanner.trouble or self._activity(inputs))
             for passage in self._program.take_passages():
@@ -93,6 +95,11 @@ class LineSimulator:
             due_s = max(due_s + self._pace.scan_s, time.monotonic())
             await asyncio.sleep(max(0.0, due_s - time.monotonic()))
         return self.summary
+
+    async def release(self) -> None:
+        """Clear enable and every other control bit: the station has no reason to miss this PLC once it has gone."""
+        if self._written is not None:
+            await self._scanner.exchange({**self._written, "control": 0})
 
     def _activity(self, inputs: Values | None) -> str:
         alarms = ", ".join(map(str, active_alarms(inputs))) if inputs else ""

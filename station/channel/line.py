@@ -154,6 +154,8 @@ class Line(ChannelMessage):
     plc_alive: bool
     """The PLC's heartbeat changes in time."""
     enabled: bool
+    enable_withdrawn: bool = False
+    """The PLC was enabled, its heartbeat or connection was lost, and it has not written enable 0 since."""
     waiting: int = Field(ge=0)
     """Outcomes that the PLC has not acknowledged."""
     counters: dict[str, int]

@@ -6,6 +6,7 @@ INTERFACE_SILENT = define(
     "operation.interface_silent", "the PLC interface has sent nothing for {age_s} s", age_s=Number(0)
 )
 HEARTBEAT_STILL = define("operation.heartbeat_still", "the PLC's heartbeat does not change")
+PLC_GONE = define("operation.plc_gone", "the PLC has lost its connection, or it does not write any more")
 PAGES_SILENT = define("operation.pages_silent", "the pages' process has sent no request for {age_s} s", age_s=Number(0))
 PAGES_FLOODED = define("operation.pages_flooded", "connections of {address} to the pages are turned away")
 METRICS_FLOODED = define("operation.metrics_flooded", "connections of {address} to the metrics are turned away")

@@ -56,7 +56,7 @@ PROVOCATIONS: dict[AlarmId, tuple[Provocation, ...]] = {
     ),
     AlarmId.REFERENCE_BAD: (Provocation("camera", "gel_torn"), Provocation("camera", "dirt")),
     AlarmId.REFERENCE_DRIFTING: (Provocation("camera", "lens_fogged"),),
-    AlarmId.PLC_HEARTBEAT_LOST: (Provocation("line", "heartbeat_frozen"),),
+    AlarmId.PLC_HEARTBEAT_LOST: (Provocation("line", "frozen_heartbeat"),),
     AlarmId.PLC_INTERFACE_LOST: (Provocation("process", "plc"),),
     AlarmId.CAN_NODE_LOST: (Provocation("can", "off"),),
     AlarmId.GATE_NOT_FIRED: (Provocation("can", "stuck"),),

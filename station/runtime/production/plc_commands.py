@@ -111,8 +111,11 @@ class PlcCommands:
             return None
         if age_s > LINE_SILENT_S:
             return operation.INTERFACE_SILENT(age_s=age_s)
-        beats = self.last_report.plc_alive or not self.last_report.enabled
-        return None if beats else operation.HEARTBEAT_STILL()
+        report = self.last_report
+        expected = report.enabled or report.enable_withdrawn
+        if report.plc_alive or not expected:
+            return None
+        return operation.HEARTBEAT_STILL() if report.plc_connected else operation.PLC_GONE()
 
     def update_line_alarms(self) -> None:
         """Raise and clear the alarms of the line's state."""

@@ -170,7 +170,7 @@ def test_its_heartbeat_keeps_it_armed_and_its_end_disarms(serve):
                     await asyncio.sleep(0.01)
             return ready, owned, rig.state.arming.value
 
-    assert asyncio.run(main()) == (True, False, "disarmed")
+    assert asyncio.run(main()) == (True, False, "withdrawn")
 
 
 async def beats_on(client):

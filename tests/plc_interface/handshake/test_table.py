@@ -279,7 +279,7 @@ def test_a_trigger_bit_left_high_over_a_reconnect_is_the_same_trigger(bench, tri
     made.run(trigger_id)
     made.feed(ev.WriterWithdrawn)
     made.feed(ev.WriterGranted)
-    assert made.state.arming is Arming.DISARMED
+    assert made.state.arming is Arming.WITHDRAWN
     made.write("enable", "trigger")
     assert made.state.trigger is Trigger.ANSWERED
     assert (made.state.last_refusal, made.state.counters["count_triggers"]) == (None, 1)
@@ -489,6 +489,29 @@ def test_the_station_is_told_of_the_line(bench):
     assert (told.plc_connected, told.plc_alive, told.enabled, told.waiting) == (True, False, True, 0)
     assert told.counters["count_bad_requests"] == 3
     assert told.faults == (GATE_LOST,)
+
+
+@pytest.mark.parametrize(("lost", "withdrawn"), [("heartbeat", True), ("writer", True), ("released", False)])
+def test_the_station_misses_a_plc_that_goes_while_it_is_armed_and_no_other(bench, lost, withdrawn):
+    made = bench()
+    made.feed(ev.WriterGranted)
+    assert not line(made.state, {}, ()).enable_withdrawn, "one that was never armed is not missed"
+    made.armed()
+    for count in (1, 2):
+        made.write("enable", plc_heartbeat=count)
+    if lost == "released":
+        made.write()
+    if lost != "heartbeat":
+        made.feed(ev.WriterWithdrawn)
+    made.now_s += made.settings.plc_heartbeat_timeout_s
+    made.feed(ev.Tick)
+    told = line(made.state, {}, ())
+    assert (told.plc_alive, told.enabled, told.enable_withdrawn) == (False, False, withdrawn)
+    made.feed(ev.WriterGranted)
+    made.write(plc_heartbeat=7)
+    made.write("enable", plc_heartbeat=8)
+    told = line(made.state, {}, ())
+    assert (told.plc_alive, told.enabled, told.enable_withdrawn) == (True, True, False)
 
 
 def test_a_plc_back_with_its_bit_high_after_the_answer_came_has_to_take_it_back(bench):

@@ -1,5 +1,6 @@
-"""`station line` ended by a person before its time."""
+"""`station line` ended by a person before its time, and at its end."""
 
+import asyncio
 import os
 import signal
 import socket
@@ -7,6 +8,8 @@ import subprocess
 import sys
 
 import pytest
+
+from plc_interface.handshake.modes import Arming
 
 PATIENCE_S = 60
 
@@ -31,3 +34,18 @@ def test_fruits_that_are_missing_are_told_by_the_exit_code(number, arguments, co
             connection.close()
     assert (line.returncode, errors) == (code, told)
     assert "0 fruits" in shown
+
+
+def test_a_line_that_has_ended_is_not_missed_as_a_lost_plc(serve):
+    async def main():
+        async with serve() as rig:
+            environment = {**os.environ, "STATION_MODBUS_PORT": str(rig.port)}
+            command = (sys.executable, "-m", "station", "line", "--count", "1")
+            line = await asyncio.create_subprocess_exec(*command, env=environment, stdout=-1)
+            async with asyncio.timeout(PATIENCE_S):
+                await line.communicate()
+                while rig.state.writer:
+                    await asyncio.sleep(0.01)
+            return line.returncode, rig.state.arming
+
+    assert asyncio.run(main()) == (0, Arming.RELEASED)

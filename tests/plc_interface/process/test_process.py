@@ -216,7 +216,8 @@ def test_a_plc_that_stands_still_or_goes_is_disarmed_and_its_results_are_kept(ce
             await plc.write(plc_heartbeat=1)
             await plc.write(plc_heartbeat=2)
             await eventually(lambda: station.lines[-1].plc_alive)
-            await eventually(lambda: not station.lines[-1].plc_alive and not station.lines[-1].enabled)
+            await eventually(lambda: not station.lines[-1].plc_alive and station.lines[-1].enable_withdrawn)
+            assert not station.lines[-1].enabled
             station.finish("FAIL", Reason.AREA_OVER_LIMIT)
             await plc.wait("result_valid", without="trigger_ready")
             await plc.set("enable")
@@ -224,6 +225,7 @@ def test_a_plc_that_stands_still_or_goes_is_disarmed_and_its_results_are_kept(ce
             await plc.arm("buffer_results")
             plc.close()
             await eventually(lambda: not station.lines[-1].plc_connected)
+            assert station.lines[-1].enable_withdrawn
             again = await made.plc()
             seen = await again.wait("result_valid", result_trigger_id=1)
             assert "trigger_ready" not in seen["status"]

@@ -241,7 +241,7 @@ class Laws:
                 if self.plc_beat not in {None, event.inputs.plc_heartbeat}:
                     self.plc_beat_s = event.at.s
                 self.plc_beat = event.inputs.plc_heartbeat
-            assert (before.arming, after.arming) != (Arming.DISARMED, Arming.ARMED), "armed without enable anew"
+            assert before.arming in {Arming.RELEASED, Arming.ARMED} or after.arming is not Arming.ARMED, "without anew"
             if "control" in event.written and "enable" not in event.inputs.control:
                 assert after.arming is Arming.RELEASED
             elif "control" in event.written and before.arming is Arming.RELEASED:

@@ -113,7 +113,7 @@ def test_a_loss_that_no_scan_has_seen_arms_again_with_enable_held(serve, make_pl
             if loss == "connection":
                 client.close()
             async with asyncio.timeout(DEADLINE_S):
-                while rig.state.arming is not Arming.DISARMED:
+                while rig.state.arming is not Arming.WITHDRAWN:
                     await asyncio.sleep(SCAN_S)
             if loss == "connection":
                 assert await client.connect()

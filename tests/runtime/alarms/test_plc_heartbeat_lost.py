@@ -1,0 +1,53 @@
+"""A PLC that was enabled and goes, at the real interface: the alarm, the readiness, and the return to normal."""
+
+import asyncio
+import json
+import urllib.error
+import urllib.request
+
+from plc_interface.client import StationClient
+from station.inspection.alarm_table import ALARMS, AlarmId
+
+NUMBER = ALARMS[AlarmId.PLC_HEARTBEAT_LOST].number
+BEATS = 10
+"""Of the station, in which it has evaluated its alarms anew."""
+
+
+def plc_health(port):
+    """What `/readyz` reports of the PLC, whether the station is ready or not."""
+    try:
+        answer = urllib.request.urlopen(f"http://127.0.0.1:{port}/readyz", timeout=20)
+    except urllib.error.HTTPError as error:
+        answer = error
+    with answer:
+        return next(part for part in json.load(answer)["dependencies"] if part["name"] == "plc")["state"]
+
+
+def test_a_plc_that_goes_while_it_is_enabled_is_an_alarm_until_it_beats_again(bench, plc_port, settings_file):
+    async def scenario():
+        file = settings_file()
+        async with bench(file) as cell, plc_port(file) as port, StationClient("127.0.0.1", port) as reader:
+            metrics_port = cell.configuration.metrics.port
+
+            async def reported(*, lost):
+                async with asyncio.timeout(60):
+                    while (NUMBER in await reader.alarms()) is not lost:
+                        await asyncio.sleep(0.05)
+                return await asyncio.to_thread(plc_health, metrics_port)
+
+            async with StationClient("127.0.0.1", port, timeout_s=10) as plc:
+                await plc.arm()
+                assert await reported(lost=False) == "ok"
+            assert await reported(lost=True) == "fault"
+            async with StationClient("127.0.0.1", port, timeout_s=10) as plc:
+                await plc.arm()
+                assert await reported(lost=False) == "ok"
+                await plc.disarm()
+            released = int(await reader.read("station_heartbeat"))
+            async with asyncio.timeout(60):
+                while (int(await reader.read("station_heartbeat")) - released) % 2**16 < BEATS:
+                    await asyncio.sleep(0.05)
+            assert "writer_owned" not in await reader.status()
+            assert await reported(lost=False) == "ok"
+
+    asyncio.run(scenario())
