@@ -59,6 +59,9 @@ class Journal(_Persistent):
     verdicts: tuple[Outcome, ...] = ()
     """Final outcomes that the station has not noted yet: its own, and those that the interface gave."""
     disowned: tuple[int, ...] = ()
-    """Ids of refused triggers that the station may have accepted, under sequences after `highest`."""
+    """Ids of refused triggers that the station may have accepted, or may still accept, under sequences after `highest`.
+
+    An id is removed when its sequence is hidden.
+    """
     hidden: tuple[int, ...] = ()
     """Sequences of such triggers, once the station has reported them; never published."""

@@ -2,13 +2,21 @@
 
 from plc_interface.handshake.actions import RequestOpen
 from plc_interface.handshake.events import Beat
-from plc_interface.handshake.modes import Link, Signal
+from plc_interface.handshake.modes import Inspection, Link, Signal
 from plc_interface.handshake.resynchronisation import resynchronise
 from plc_interface.handshake.work import Work, described, row
 from station.vocabulary import PackmlState
 
 _AT_THE_FRUIT = {PackmlState.STARTING, PackmlState.EXECUTE}
 """Also where the interface knows of no accepted trigger: the station may have begun one that was refused as lost."""
+
+
+def begins_refused_trigger(work: Work) -> bool:
+    """The station is at a fruit, none is accepted, and a trigger was refused as lost."""
+    state = work.state
+    at_fruit = isinstance(work.event, Beat) and work.event.station.packml_state in _AT_THE_FRUIT
+    return at_fruit and state.inspection is Inspection.NONE and bool(state.journal.disowned)
+
 
 none_is_pending = described("`Resume` is not pending.", lambda work: work.state.open_request is None)
 
@@ -67,6 +75,7 @@ ROWS = (
     row(RESUMING, Signal.STATION_BUSY),
     row(RESUMING, Signal.CHANNEL_FAILED, clear_request),
     row(RESUMING, Signal.STATION_SILENT, clear_station, to=LOST),
+    row(UP, Signal.STATION_ANSWERED, store_state, beat, request_open, when=begins_refused_trigger),
     row(UP, Signal.STATION_ANSWERED, store_state, beat),
     row(UP, Signal.STATION_RESTARTED, store_state, request_open, to=RESUMING),
     row(UP, Signal.STATION_BUSY, request_open),

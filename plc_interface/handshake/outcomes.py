@@ -81,7 +81,11 @@ def hide(work: Work, outcome: Outcome) -> None:
         return  # and the station has noted it
     work.log(f"inspection {outcome.sequence} belongs to a trigger that was refused: it is called off")
     work.durable = True
+    disowned = list(journal.disowned)
+    if outcome.trigger_id in disowned:
+        disowned.remove(outcome.trigger_id)
     work.update_journal(
+        disowned=tuple(disowned),
         verdicts=(*journal.verdicts, outcome)[-MOST_UNNOTED:],
         hidden=(*journal.hidden, outcome.sequence),
         highest=max(journal.highest, outcome.sequence),

@@ -14,7 +14,7 @@ from plc_interface.handshake.state import Fault, restarted
 from plc_interface.handshake.table import REGIONS
 from plc_interface.handshake.view import line, lot_checksum, result_values, view
 from plc_interface.registers.map import BY_NAME
-from station.channel.line import BeginReply, LineFault, Open, Reason, Refusal
+from station.channel.line import BeginReply, LineFault, Open, PackmlState, Reason, Refusal
 from station.messages.message import verbatim
 
 
@@ -139,6 +139,42 @@ def test_an_unanswered_begin_is_refused_and_what_it_began_is_never_shown(bench):
     assert (told.outcome.sequence, told.outcome.outcome, taken) == (41, "NO_RESULT", do.NotifyAcknowledged(41))
     assert view(made.state)["result_sequence"] == 0
     assert made.state.journal.acknowledged == 41
+
+
+def test_what_the_station_begins_after_its_trigger_was_refused_is_aborted(bench):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.BeginFailed, made.state.pending.number)
+    made.link(packml_state=PackmlState.IDLE)
+    assert "acquiring" not in status(made), "it has not begun when it reports its state and what is open"
+    made.actions.clear()
+    made.feed(ev.Beat, made.station_state(packml_state=PackmlState.EXECUTE))
+    assert "acquiring" in status(made)
+    assert len(made.of(do.RequestOpen)) == 1
+    made.feed(ev.OpenAnswered, made.state.open_request, Open(running=(41, 7), outcomes=()))
+    assert [action.outcome.sequence for action in made.of(do.NotifyPublished)] == [41]
+    assert (made.state.link, made.state.queue, made.state.journal.acknowledged) == (Link.UP, (), 41)
+    made.feed(ev.Beat, made.station_state(packml_state=PackmlState.EXECUTE))
+    assert len(made.of(do.RequestOpen)) == 1, "its fingers are still opening"
+
+
+@pytest.mark.parametrize("reports", [PackmlState.STARTING, PackmlState.EXECUTE])
+def test_an_accepted_fruit_asks_for_nothing_after_a_trigger_that_was_lost(bench, reports):
+    made = bench()
+    made.armed()
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.BeginFailed, made.state.pending.number)
+    made.link(packml_state=PackmlState.IDLE)
+    made.write("enable")
+    made.write("enable", "trigger", trigger_id=8)
+    made.actions.clear()
+    made.feed(ev.Beat, made.station_state(packml_state=reports))
+    made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=42, deadline_s=2.0))
+    made.feed(ev.Beat, made.station_state(packml_state=reports))
+    made.feed(ev.OutcomeReceived, made.outcome(sequence=42, trigger_id=8))
+    made.feed(ev.Beat, made.station_state(packml_state=reports))
+    assert made.of(do.RequestOpen) == []
 
 
 def test_a_station_busy_with_an_unknown_inspection_is_asked_which_and_stays_online(bench):

@@ -539,6 +539,22 @@ class Handshake(RuleBasedStateMachine):
         if interface:
             self.interface_restarts()
 
+    @rule()
+    def begins_late(self) -> None:
+        """The station carries out a trigger whose answer is not waited for any more, after it said that it is idle."""
+        self.heal()
+        self.trigger(armed=True, link=True)
+        late = [request for request in self.to_station if isinstance(request.action, do.RequestBegin)]
+        self.to_station = [request for request in self.to_station if request not in late]
+        self.time_passes(SETTINGS.begin_deadline_s, beats=True)
+        self.heal()
+        run = self.runs
+        for request in late:
+            reply = self.station.begin(request.action.trigger_id)
+            self.answers.append(ev.BeginAnswered(self.at(), request.action.number, reply))
+        self.heal()
+        assert not late or self.runs != run or self.station.running is None, "a refused fruit is inspected"
+
     @precondition(lambda self: self.station.up)
     @rule()
     def station_dies(self) -> None:
