@@ -87,8 +87,6 @@ def _outcome_failed(work: Work, event: OutcomeFailed) -> None:
 def _open_answered(work: Work, event: OpenAnswered) -> None:
     if event.number == work.state.open_request:
         work.signals.append(Signal.OPENED)
-    else:
-        work.state.stale += 1
 
 
 def _outcome_noted(work: Work, event: OutcomeNoted) -> None:
@@ -189,8 +187,8 @@ def _acknowledged(work: Work, event: PlcWrote, rose: frozenset[str], *, changed:
 
 def _begin_answered(work: Work, event: BeginAnswered | BeginFailed) -> None:
     if work.state.pending is None or work.state.pending.number != event.number:
-        work.state.stale += 1
-    elif isinstance(event, BeginFailed):
+        return
+    if isinstance(event, BeginFailed):
         work.signals += [Signal.BEGIN_FAILED, Signal.CHANNEL_FAILED]
     elif event.begun.sequence is not None and event.begun.refusal is None:
         work.signals.append(Signal.BEGUN)
@@ -200,8 +198,8 @@ def _begin_answered(work: Work, event: BeginAnswered | BeginFailed) -> None:
 
 def _command_answered(work: Work, event: CommandAnswered | CommandFailed) -> None:
     if event.number != work.state.command_request:
-        work.state.stale += 1
-    elif isinstance(event, CommandFailed):
+        return
+    if isinstance(event, CommandFailed):
         work.signals.append(Signal.COMMAND_FAILED)
     elif event.done:
         work.signals.append(Signal.COMMAND_DONE)

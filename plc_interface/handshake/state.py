@@ -134,8 +134,6 @@ class State:
     reset_utc_ms: int
     unlisted: int = 0
     """Pairs of mode and signal that came and are not in the table: refused."""
-    stale: int = 0
-    """Answers that came after their question was settled otherwise."""
     faults: tuple[Fault, ...] = ()
 
     journal: Journal

@@ -27,7 +27,6 @@ class Trouble(StrEnum):
     UNKNOWN_UNIT = "unknown units"
     NO_RIGHT = "writes without the right"
     NOT_WRITER = "writes beside the writer"
-    WRITE_REFUSED = "writes refused by the handshake"
     DEVICE_FAILURE = "internal faults"
     NOT_ALLOWED = "connections not allowed"
     TOO_MANY = "connections over the limit"

@@ -12,8 +12,8 @@ from plc_interface.server.exceptions import ExceptionCode, RequestError, Trouble
 from plc_interface.server.image import RegisterImage
 from plc_interface.server.peer import Peer
 
-OnWrite = Callable[[Peer, Mapping[str, int | float | str]], ExceptionCode | None]
-"""Called with the writer's whole fields after every check and before they are in the image; may refuse them."""
+OnWrite = Callable[[Peer, Mapping[str, int | float | str]], None]
+"""Called with the writer's whole fields after every check and before they are in the image."""
 
 Claim = Callable[[Peer], bool]
 """Takes or renews the right to write; False where another client has it."""
@@ -49,7 +49,7 @@ class RequestHandler:
 
         Args:
             unit: the valid unit identifier beside those of the server itself.
-            image: read, and written after `on_write` agreed.
+            image: read, and written after `on_write` has returned.
             owns: whether a client has the right to write.
             release: called after the writer has released the right to write.
         """
@@ -91,9 +91,7 @@ class RequestHandler:
             raise RequestError(ExceptionCode.BUSY, Trouble.NOT_WRITER, why)
         if not self._claim(peer):
             raise RequestError(ExceptionCode.BUSY, Trouble.NOT_WRITER, "another client holds the right to write")
-        refusal = self._on_write(peer, write.values)
-        if refusal is not None:
-            raise RequestError(refusal, Trouble.WRITE_REFUSED, f"{', '.join(write.values)}: the handshake refused it")
+        self._on_write(peer, write.values)
         self._image.commit(write.values)
         if self._image.value(_KEY) != WRITE_KEY:
             self._release()

@@ -37,8 +37,8 @@ class ModbusServer:
 
         Args:
             image: the registers; commit to it on this event loop alone.
-            on_write: called with whole fields, after every check and before they are in the image; may refuse them with
-                an exception code. It runs between request and response and must not wait.
+            on_write: called with whole fields, after every check and before they are in the image. It runs
+                between request and response and must not wait.
             on_writer: called when the right to write is granted or withdrawn.
         """
         self._settings = settings

@@ -36,7 +36,7 @@ class Play:
     def read(self) -> dict[str, Any]:
         """Everything that the interface shows of its state."""
         shown = line(self.state, {"count_bad_requests": 3}, ())
-        return view(self.state) | {"line": _plain(shown), "due": next_due_s(self.state), "stale": self.state.stale}
+        return view(self.state) | {"line": _plain(shown), "due": next_due_s(self.state)}
 
     def run(self) -> list[str]:
         """Play, and return a line for each step."""

@@ -15,7 +15,6 @@ import pytest
 from plc_interface.registers.bits import WRITE_KEY
 from plc_interface.registers.codec import WordOrder
 from plc_interface.registers.map import BY_NAME
-from plc_interface.server.exceptions import ExceptionCode
 from plc_interface.server.image import RegisterImage
 from plc_interface.server.peer import Peer
 from plc_interface.server.server import ModbusServer
@@ -32,7 +31,6 @@ class Serving:
         self.settings = ModbusSettings(**settings)
         self.writes: list[dict[str, Any]] = []
         self.changes: list[tuple[Peer | None, WriterChange]] = []
-        self.refusal: ExceptionCode | None = None
         self.image: RegisterImage
         self.server: ModbusServer
         self.loop = asyncio.new_event_loop()
@@ -76,10 +74,8 @@ class Serving:
         self.server = ModbusServer(self.settings, self.image, self._on_write, self._on_writer)
         await self.server.start()
 
-    def _on_write(self, peer: Peer, values: Mapping[str, Any]) -> ExceptionCode | None:
-        if self.refusal is None:
-            self.writes.append(dict(values))
-        return self.refusal
+    def _on_write(self, peer: Peer, values: Mapping[str, Any]) -> None:
+        self.writes.append(dict(values))
 
     def _on_writer(self, peer: Peer | None, change: WriterChange) -> None:
         self.changes.append((peer, change))

@@ -6,7 +6,7 @@ import pytest
 
 from plc_interface.registers.map import BY_NAME, REGISTERS, bit_address
 from plc_interface.registers.register import Access, Kind
-from plc_interface.server.exceptions import ExceptionCode, Trouble
+from plc_interface.server.exceptions import Trouble
 
 CONTROL, TRIGGER_ID, KEY = (BY_NAME[name].address for name in ("control", "trigger_id", "write_key"))
 BLOCK_END = BY_NAME["size_class"].end
@@ -95,12 +95,6 @@ class TestWriting:
     def test_text(self, serving, plc):
         plc.write(BY_NAME["lot"].address, *struct.unpack(">16H", b"LOT 7".ljust(32, b"\0")))
         assert serving.image.value("lot") == "LOT 7"
-
-    def test_what_the_handshake_refuses_is_not_written(self, serving, plc):
-        serving.refusal = ExceptionCode.DEVICE_FAILURE
-        assert plc.write(TRIGGER_ID, 9) == bytes([0x90, 4])
-        assert serving.image.value("trigger_id") == 0
-        assert serving.server.statistics.troubles[Trouble.WRITE_REFUSED] == 1
 
     def test_a_fault_of_ours_is_answered_and_the_connection_stays(self, serving, plc, monkeypatch):
         monkeypatch.setattr(serving.image, "commit", lambda _: 1 / 0)
