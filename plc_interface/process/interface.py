@@ -68,7 +68,7 @@ class Interface:
         """Report to the PLC that the station is offline; nothing is started any more."""
         self.feed(ev.ShuttingDown(now()))
 
-    def on_write(self, _writer: Peer, values: Mapping[str, int | float | str]) -> None:
+    def on_write(self, _writer: Peer, values: Mapping[str, Value]) -> None:
         """Handle a write; the answer is in the registers before the request is answered."""
         known: dict[str, Any] = {name: value for name, value in values.items() if name != "write_key"}
         if "control" in known:

@@ -132,7 +132,7 @@ COMMAND_RESULT_CODES = {
     3: Code("failed", "The station failed to execute it; its log and its HMI give the reason"),
     4: Code("timed_out", "The station did not end it in time, or the interface was restarted meanwhile"),
     5: Code("station_lost", "The station does not answer"),
-    6: Code("no_command", "The command code is 0"),
+    6: Code("no_command", "There is no command of this code"),
 }
 
 OUTCOME_CODES = {

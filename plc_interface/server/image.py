@@ -21,6 +21,8 @@ def _addresses(*, of: Access | None = None, kind: Kind | None = None) -> bytes:
     return bytes(marks)
 
 
+_LEFT_TO_THE_HANDSHAKE = frozenset({"lot", "command_code"})
+"""A PLC writes them in each scan, so a wrong one fails only the bit that uses it: a refused write has no heartbeat."""
 _MAPPED, _WRITABLE, _FLAGS = _addresses(), _addresses(of=Access.READ_WRITE), _addresses(kind=Kind.BITS)
 
 
@@ -47,13 +49,13 @@ class RegisterImage:
         )
 
     def commit(self, values: Mapping[str, Value]) -> None:
-        """Set registers by name, all at once or none; None for a register's own "there is none".
+        """Set registers by name, all at once or none; None for a register's own "there is none", of a text NUL.
 
         Raises:
             KeyError: a name that the map does not have.
             RegisterValueError: a value that its register cannot hold.
         """
-        slices = [(BY_NAME[name].address, encode(BY_NAME[name], value, self._order)) for name, value in values.items()]
+        slices = [(BY_NAME[name].address, self._encoded(BY_NAME[name], value)) for name, value in values.items()]
         for address, words in slices:
             struct.pack_into(f">{len(words)}H", self._wire, 2 * address, *words)
         self._values.update(values)
@@ -86,8 +88,10 @@ class RegisterImage:
         every = sum(word << 16 * position for position, word in enumerate(words))
         return (every >> address % 16 & (1 << count) - 1).to_bytes((count + 7) // 8, "little")
 
-    def written(self, address: int, raw: bytes) -> dict[str, int | float | str]:
+    def written(self, address: int, raw: bytes) -> dict[str, Value]:
         """Return the fields of a write to registers, two bytes each; nothing is changed.
+
+        A lot that is not printable ASCII is None, and a command code may be one that does not exist.
 
         Raises:
             RequestError: 02 if a register is read-only or not in the map, 03 if a field would be half written or does
@@ -97,7 +101,8 @@ class RegisterImage:
         end = address + len(words)
         if end > _END or _WRITABLE.find(0, address, end) >= 0:
             raise illegal_address(f"registers {address} to {end - 1} are not all in the map and writable")
-        values, position = {}, address
+        values: dict[str, Value] = {}
+        position = address
         while position < end:
             register = _AT.get(position)
             if register is None or register.end > end:
@@ -106,7 +111,7 @@ class RegisterImage:
             position = register.end
         return values
 
-    def written_bits(self, address: int, count: int, bits: int) -> dict[str, int | float | str]:
+    def written_bits(self, address: int, count: int, bits: int) -> dict[str, Value]:
         """Return the fields of a write to flags, the first in the lowest bit; nothing is changed.
 
         Raises:
@@ -132,11 +137,17 @@ class RegisterImage:
     def _words(self, address: int, count: int) -> tuple[int, ...]:
         return struct.unpack_from(f">{count}H", self._wire, 2 * address)
 
-    def _decoded(self, register: Register, words: tuple[int, ...]) -> int | float | str:
+    def _encoded(self, register: Register, value: Value) -> tuple[int, ...]:
+        return encode(register, "" if value is None and register.kind is Kind.TEXT else value, self._order)
+
+    def _decoded(self, register: Register, words: tuple[int, ...]) -> Value:
+        left = register.name in _LEFT_TO_THE_HANDSHAKE
         try:
             value = decode(register, words, self._order)
         except RegisterValueError as error:
+            if left:
+                return None
             raise illegal_value(str(error)) from error
-        if why := problem(register, value):
+        if not left and (why := problem(register, value)):
             raise illegal_value(why)
         return value

@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from plc_interface.registers.bits import WRITE_KEY
+from plc_interface.registers.register import Value
 from plc_interface.server import identification, reading, writing
 from plc_interface.server.exceptions import ExceptionCode, RequestError, Trouble, illegal_function
 from plc_interface.server.image import RegisterImage
 from plc_interface.server.peer import Peer
 
-OnWrite = Callable[[Peer, Mapping[str, int | float | str]], None]
+OnWrite = Callable[[Peer, Mapping[str, Value]], None]
 """Called with the writer's whole fields after every check and before they are in the image."""
 
 Claim = Callable[[Peer], bool]

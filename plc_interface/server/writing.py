@@ -7,6 +7,7 @@ import struct
 from collections.abc import Callable
 from typing import NamedTuple
 
+from plc_interface.registers.register import Value
 from plc_interface.server.exceptions import illegal_value
 from plc_interface.server.image import RegisterImage
 from plc_interface.server.reading import checked_registers, refuse_length, unpacked
@@ -20,7 +21,7 @@ _COIL = {0x0000: 0, 0xFF00: 1}
 class Write(NamedTuple):
     """A checked write, not carried out yet."""
 
-    values: dict[str, int | float | str]
+    values: dict[str, Value]
     """By the names of whole fields."""
     response: Callable[[], bytes]
     """The message that answers it, once it is carried out."""

@@ -18,7 +18,11 @@ WRONG_ACKNOWLEDGEMENT = define(
     "line.wrong_acknowledgement",
     "the PLC acknowledged another sequence than the one shown: read result_sequence, and check the word order",
 )
-BAD_LOT = define("line.bad_lot", "the lot id is not printable ASCII and was not taken over: write it again")
+BAD_LOT = define(
+    "line.bad_lot",
+    "the lot id is not printable ASCII and was not taken over: write it without a barcode reader's line end, and latch "
+    "it again",
+)
 COMMAND_BUSY = define(
     "line.command_busy", "the PLC gave a command while another was carried out: wait for command_done or command_failed"
 )

@@ -273,7 +273,7 @@ def test_a_refused_write_says_why(serve):
             with pytest.raises(RequestRefusedError, match=r"exception 02: .*read-only") as read_only:
                 await client.write({"status": 1})
             with pytest.raises(RequestRefusedError, match=r"exception 03") as bad:
-                await client.write({"command_code": 99})
+                await client.write({"control": 0x8000})
             return read_only.value.code, bad.value.code
 
     assert asyncio.run(main()) == (2, 3)

@@ -5,6 +5,7 @@ import contextlib
 import os
 import shutil
 import signal
+import struct
 import sys
 import tempfile
 import time
@@ -59,6 +60,12 @@ class Plc:
             if answer.isError():
                 return answer.exception_code
         return 0
+
+    async def beat(self, heartbeat: int, lot: bytes) -> None:
+        """Heartbeat, encoder and lot in one request, as a program writes them in each scan; any bytes for the lot."""
+        words = struct.unpack(">16H", lot.ljust(32, b"\0"))
+        answer = await self._client.write_registers(BY_NAME["plc_heartbeat"].address, [heartbeat, 0, 0, *words])
+        assert not answer.isError(), answer
 
     async def set(self, *bits: str, **values: int | str) -> None:
         """Raise control bits, with other values in the same request where they are neighbours."""

@@ -130,6 +130,27 @@ def test_every_refusal_is_told_with_its_reason_and_counted(cell, limit_s):
     asyncio.run(scenario())
 
 
+def test_a_lot_with_a_barcode_readers_cr_fails_its_latch_and_nothing_else(cell, eventually):
+    async def scenario():
+        async with cell() as made:
+            station, plc = made.station, await made.plc()
+            await plc.arm("buffer_results")
+            for heartbeat in (1, 2):
+                await plc.beat(heartbeat, b"LOT 7\r")
+                await plc.wait("trigger_ready", plc_heartbeat_echo=heartbeat)
+            await eventually(lambda: station.lines[-1].plc_alive)
+            assert station.lines[-1].faults == ()
+            await plc.set("latch_lot")
+            await plc.wait("trigger_ready", without="lot_latched", latched_lot_checksum=0)
+            await eventually(lambda: [fault.what.id for fault in station.lines[-1].faults] == [line.BAD_LOT.id])
+            await plc.drop("latch_lot")
+            await plc.beat(3, b"LOT 7")
+            await plc.set("latch_lot")
+            await plc.wait("lot_latched", latched_lot_checksum=lot_checksum("LOT 7"))
+
+    asyncio.run(scenario())
+
+
 def test_no_fruit_is_begun_while_the_reject_gate_cannot_divert_it(cell, eventually):
     """An interface that this machine does not have: told to the station, and every trigger is refused."""
 
@@ -397,12 +418,13 @@ def test_commands_are_carried_out_once(cell, limit_s):
             assert [(c.command, c.argument) for c in station.commands] == [("change_recipe", 7)]
             station.command_done = CommandDone(done=False, why=verbatim("no recipe has this number"))
             assert (await order(1, 9, 2))["command_result"] == "failed"
-            assert (await order(0, 0, 3))["command_result"] == "no_command"
+            for code, sequence in ((0, 3), (99, 4)):
+                assert (await order(code, 0, sequence))["command_result"] == "no_command"
             station.command_gate.clear()
-            assert (await order(4, 2, 4))["command_result"] == "timed_out"
+            assert (await order(4, 2, 5))["command_result"] == "timed_out"
             await station.die()
             await plc.wait(without="online")
-            assert (await order(2, 0, 5))["command_result"] == "station_lost"
+            assert (await order(2, 0, 6))["command_result"] == "station_lost"
             assert len(station.commands) == 3
             before = await plc.group("counters")
             await plc.set("reset_counters")

@@ -96,6 +96,19 @@ class TestWriting:
         plc.write(BY_NAME["lot"].address, *struct.unpack(">16H", b"LOT 7".ljust(32, b"\0")))
         assert serving.image.value("lot") == "LOT 7"
 
+    @pytest.mark.parametrize("lot", [b"LOT 7\r", b"\xff" * 32])
+    def test_a_lot_that_is_no_text_is_none_and_the_rest_of_the_scan_is_taken(self, serving, plc, lot):
+        """Refused as a whole, each scan of a PLC that also writes its heartbeat would be lost with it."""
+        address = BY_NAME["plc_heartbeat"].address
+        assert plc.write(address, 5, 0, 0, *struct.unpack(">16H", lot.ljust(32, b"\0")))[0] == 16
+        assert serving.writes == [{"plc_heartbeat": 5, "encoder": 0, "lot": None}]
+        assert (serving.image.value("plc_heartbeat"), serving.image.value("lot")) == (5, None)
+        assert plc.read(BY_NAME["lot"].address, 16) == bytes(32)
+
+    def test_a_command_that_does_not_exist_is_left_to_the_handshake(self, serving, plc):
+        assert plc.write(BY_NAME["command_code"].address, 99, 3)[0] == 16
+        assert serving.writes == [{"command_code": 99, "command_argument": 3}]
+
     def test_a_fault_of_ours_is_answered_and_the_connection_stays(self, serving, plc, monkeypatch):
         monkeypatch.setattr(serving.image, "commit", lambda _: 1 / 0)
         assert plc.write(TRIGGER_ID, 9) == bytes([0x90, 4])
@@ -135,9 +148,7 @@ BAD = {
     "an unmapped register written": (struct.pack(">BHH", 6, UNMAPPED, 1), 2),
     "a write that runs off the block": (struct.pack(">BHHBHH", 16, BLOCK_END - 1, 2, 4, 0, 0), 2),
     "flags without a meaning": (struct.pack(">BHH", 6, CONTROL, 0x8000), 3),
-    "no such command": (struct.pack(">BHH", 6, BY_NAME["command_code"].address, 99), 3),
     "no such key": (struct.pack(">BHH", 6, KEY, 1), 3),
-    "a text that is none": (struct.pack(">BHHB32s", 16, BY_NAME["lot"].address, 16, 32, b"\xff" * 32), 3),
     "a mask on half a value": (struct.pack(">BHHH", 22, BY_NAME["encoder"].address, 0, 0), 3),
     "a mask on what is read only": (struct.pack(">BHHH", 22, BY_NAME["status"].address, 0, 0), 2),
     "122 registers beside a read": (struct.pack(">BHHHHB121H", 23, 0, 1, 0, 122, 242, *[0] * 121), 3),
@@ -197,13 +208,13 @@ class TestBadRequests:
                 assert plc.write(address, 0) == bytes([0x90, 2]), address
         assert not serving.writes
 
-    def test_every_flag_without_a_meaning_and_every_unknown_code(self, serving, plc):
+    def test_every_flag_without_a_meaning_and_every_unknown_key(self, serving, plc):
         writable = [register for register in REGISTERS if register.access is Access.READ_WRITE]
         for register in writable:
             if register.kind is Kind.BITS:
                 bad = [1 << number for number in range(16) if not register.mask >> number & 1]
-            elif register.codes:
-                bad = [value for value in (1, 2, 50, 0xFFFF) if value not in register.codes]
+            elif register.address == KEY:
+                bad = [1, 2, 50, 0xFFFF]
             else:
                 continue
             for value in bad:
