@@ -11,13 +11,20 @@ from station.channel.line import CommandName
 _CODES = BY_NAME["command_code"].codes
 
 
-def is_repeated(work: Work) -> bool:
+def is_reused(work: Work) -> bool:
     """The sequence is that of the last command."""
     return work.state.inputs.command_sequence == work.state.journal.command_sequence
 
 
+def is_repeated(work: Work) -> bool:
+    """Sequence, code and argument are those of the last command."""
+    inputs, journal = work.state.inputs, work.state.journal
+    content = journal.command_code, journal.command_argument
+    return is_reused(work) and content in {(None, None), (inputs.command_code, inputs.command_argument)}
+
+
 def is_done_already(work: Work) -> bool:
-    """The sequence is that of the last command, which is done."""
+    """Sequence, code and argument are those of the last command, which is done."""
     return is_repeated(work) and work.state.journal.command_result == COMMAND_RESULT.code("done")
 
 
@@ -28,9 +35,16 @@ def is_no_command(work: Work) -> bool:
 
 station_is_lost = described("The station is lost.", lambda work: work.state.link is not Link.UP)
 bit_is_high = described("The bit is high.", lambda work: "execute_command" in (work.state.seen or ()))
-note_sequence = described(
-    "Echo the sequence.", lambda work: work.update_journal(command_sequence=work.state.inputs.command_sequence)
-)
+
+
+def note_command(work: Work) -> None:
+    """Echo the sequence."""
+    inputs = work.state.inputs
+    work.update_journal(
+        command_sequence=inputs.command_sequence,
+        command_code=inputs.command_code,
+        command_argument=inputs.command_argument,
+    )
 
 
 def request(work: Work) -> None:
@@ -55,6 +69,9 @@ def result(name: str) -> Effect:
 watch = described("Start the execute bit's time-out.", lambda work: work.watch_bit(Signal.EXECUTE_TIMEOUT))
 end_watch = described("Stop the time-out.", lambda work: work.stop(Signal.EXECUTE_TIMEOUT))
 not_reset = described("Fault: execute bit not reset in time.", lambda work: work.fault(Fault.EXECUTE_NOT_RESET))
+reused = described(
+    "Fault: another command under the last one's sequence.", lambda work: work.fault(Fault.COMMAND_REUSED)
+)
 busy = described("Fault: command while another one is executed.", lambda work: work.fault(Fault.COMMAND_BUSY))
 
 
@@ -76,9 +93,10 @@ def _at_rest(mode: Command) -> tuple[Row, ...]:
     return (
         row(mode, on, watch, to=DONE, when=is_done_already),
         row(mode, on, watch, to=FAILED, when=is_repeated),
-        row(mode, on, note_sequence, result("no_command"), watch, to=FAILED, when=is_no_command),
-        row(mode, on, note_sequence, result("station_lost"), watch, to=FAILED, when=station_is_lost),
-        row(mode, on, note_sequence, result("executing"), end_watch, request, to=EXECUTING),
+        row(mode, on, note_command, reused, result("failed"), watch, to=FAILED, when=is_reused),
+        row(mode, on, note_command, result("no_command"), watch, to=FAILED, when=is_no_command),
+        row(mode, on, note_command, result("station_lost"), watch, to=FAILED, when=station_is_lost),
+        row(mode, on, note_command, result("executing"), end_watch, request, to=EXECUTING),
         row(mode, Signal.EXECUTE_OFF, end_watch, to=IDLE),
         row(mode, Signal.WRITER_LOST, end_watch, to=IDLE),
         row(mode, Signal.STATION_SILENT),

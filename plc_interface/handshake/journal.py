@@ -49,6 +49,9 @@ class Journal(_Persistent):
     lot: str = Field(default="", max_length=32)
     """The lot in force."""
     command_sequence: int | None = Field(default=None, ge=0, le=65_535)
+    command_code: int | None = Field(default=None, ge=0, le=65_535)
+    """Of the last command; None in the journal of a version that did not store it."""
+    command_argument: int | None = Field(default=None, ge=0, le=65_535)
     command_result: int = Field(default=0, ge=0, le=65_535)
     """As in the register map."""
     asked_id: int | None = Field(default=None, ge=1, le=65_535)

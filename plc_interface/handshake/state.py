@@ -27,6 +27,7 @@ class Fault(Enum):
     WRONG_ACKNOWLEDGEMENT = messages.WRONG_ACKNOWLEDGEMENT
     BAD_LOT = messages.BAD_LOT
     COMMAND_BUSY = messages.COMMAND_BUSY
+    COMMAND_REUSED = messages.COMMAND_REUSED
 
     @property
     def message(self) -> Message:

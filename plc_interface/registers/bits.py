@@ -129,7 +129,7 @@ COMMAND_RESULT_CODES = {
     0: Code("none", "No command yet; a start of the interface keeps the last one's result"),
     1: Code("executing", "Being carried out"),
     2: Code("done", "Done"),
-    3: Code("failed", "The station failed to execute it; its log and its HMI give the reason"),
+    3: Code("failed", "Not executed: the log and the HMI give the reason; or another command had this sequence"),
     4: Code("timed_out", "The station did not end it in time, or the interface was restarted meanwhile"),
     5: Code("station_lost", "The station does not answer"),
     6: Code("no_command", "There is no command of this code"),

@@ -26,6 +26,11 @@ BAD_LOT = define(
 COMMAND_BUSY = define(
     "line.command_busy", "the PLC gave a command while another was carried out: wait for command_done or command_failed"
 )
+COMMAND_REUSED = define(
+    "line.command_reused",
+    "the PLC gave another command under the number of its last one, and it was not carried out: count "
+    "command_sequence on from command_sequence_echo",
+)
 JOURNAL_NOT_WRITTEN = define(
     "line.journal_not_written",
     "the journal {file} cannot be written: {error}; until it can, a restart of the PLC interface may lose results",

@@ -309,6 +309,32 @@ def test_a_doubled_command_of_the_run_before_is_not_carried_out_again(bench):
     assert view(made.state)["command_result"] == BY_NAME["command_result"].code("timed_out")
 
 
+@pytest.mark.parametrize("result", ["done", "failed"])
+@pytest.mark.parametrize("other", [{"command_code": 3}, {"command_argument": 2}])
+def test_another_command_under_the_last_ones_number_fails_and_is_named(bench, result, other):
+    """A PLC that starts to count at 1 after its restart must not read `done` for what was not carried out."""
+    made = bench()
+    made.armed()
+    first = {"command_code": 1, "command_argument": 3, "command_sequence": 1}
+    made.write("enable", "execute_command", **first)
+    made.feed(ev.CommandAnswered, made.state.command_request, done=result == "done", why="")
+    made.write("enable")
+    again = bench(Journal.model_validate_json(made.state.journal.model_dump_json(exclude_defaults=True)))
+    again.armed()
+    again.write("enable", "execute_command", **first)
+    assert (view(again.state)["command_result"], again.state.faults) == (BY_NAME["command_result"].code(result), ())
+    for faults in ((Fault.COMMAND_REUSED,), ()):
+        again.write("enable", "clear_error")
+        again.write("enable", "execute_command", **{**first, **other})
+        assert view(again.state)["command_result"] == BY_NAME["command_result"].code("failed")
+        assert "command_failed" in status(again)
+        assert again.state.faults == faults, "the same again has the same result and is no new fault"
+    assert again.of(do.RequestCommand) == []
+    again.write("enable")
+    again.write("enable", "execute_command", **{**first, **other, "command_sequence": 2})
+    assert len(again.of(do.RequestCommand)) == 1
+
+
 @pytest.mark.parametrize("trigger_id", [1, 7])
 def test_a_trigger_bit_left_high_over_a_reconnect_is_the_same_trigger(bench, trigger_id):
     made = bench()

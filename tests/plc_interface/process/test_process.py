@@ -415,6 +415,8 @@ def test_commands_are_carried_out_once(cell, limit_s):
 
             assert "command_done" in (await order(1, 7, 1))["status"]
             assert "command_done" in (await order(1, 7, 1))["status"]
+            seen = await order(1, 8, 1)
+            assert ("command_failed" in seen["status"], seen["command_result"]) == (True, "failed")
             assert [(c.command, c.argument) for c in station.commands] == [("change_recipe", 7)]
             station.command_done = CommandDone(done=False, why=verbatim("no recipe has this number"))
             assert (await order(1, 9, 2))["command_result"] == "failed"

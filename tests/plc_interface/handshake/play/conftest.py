@@ -212,9 +212,14 @@ class Laws:
             self._command_given(event.inputs, before, after)  # pyrefly: ignore[missing-attribute] (`_rises` has looked)
 
     def _command_given(self, inputs: ev.Inputs, before: State, after: State) -> None:
-        new = inputs.command_sequence != before.journal.command_sequence
+        journal = before.journal
+        new = inputs.command_sequence != journal.command_sequence
+        other = (inputs.command_code, inputs.command_argument) != (journal.command_code, journal.command_argument)
         if before.command is Command.EXECUTING:
-            assert not new or Fault.COMMAND_BUSY in after.faults
+            assert not (new or other) or Fault.COMMAND_BUSY in after.faults
+        elif not new and other:
+            assert Fault.COMMAND_REUSED in after.faults
+            assert (after.command, after.journal.command_result) == (Command.FAILED, COMMAND_RESULT.code("failed"))
         elif new:
             assert after.journal.command_sequence == inputs.command_sequence
             good = inputs.command_code in BY_NAME["command_code"].codes and inputs.command_code != 0
