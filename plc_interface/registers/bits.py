@@ -97,7 +97,7 @@ ALARM_BITS, MORE_ALARM_BITS = (
 _REFUSALS: Mapping[Refusal, str] = {
     Refusal.NOT_ENABLED: "Enable is off",
     Refusal.NOT_READY: "The station is not ready, see the error code and PackML state",
-    Refusal.BUSY: "An inspection is under way",
+    Refusal.BUSY: "An inspection is under way, or its fruit is not released yet",
     Refusal.QUEUE_FULL: "Results wait for their acknowledgement",
     Refusal.BAD_TRIGGER_ID: "The trigger id is 0 or the one of the trigger before",
     Refusal.OFFLINE: "The PLC has set offline, or the interface is about to end",

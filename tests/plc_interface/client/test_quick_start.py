@@ -72,3 +72,11 @@ def test_every_register_and_bit_that_a_document_names_is_in_the_map(name, vocabu
     named = set(re.findall(r"`([a-z]+_[a-z_]+)`", plain))
     assert named
     assert named - vocabulary == set()
+
+
+@pytest.mark.parametrize("refusal", ["busy", "recipe_changing"])
+def test_a_refusal_is_waited_out_by_the_bit_that_ends_with_its_cause(refusal):
+    """`inspecting` falls before the fruit is released, and no `command_done` follows a change from the panel."""
+    text = (DOCUMENT.parent / "handshake.md").read_text("utf-8")
+    (remedy,) = re.findall(rf"^\| {refusal} \| (.*) \|$", text, re.MULTILINE)
+    assert remedy.startswith("wait for `trigger_ready`")

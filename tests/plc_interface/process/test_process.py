@@ -95,6 +95,10 @@ def test_every_refusal_is_told_with_its_reason_and_counted(cell, limit_s):
             await refused(6)
             assert "overrun" in (await plc.read())["status"]
             await plc.write(acknowledged_sequence=101)
+            station.refusal = Refusal.BUSY
+            assert "inspecting" not in (await plc.read())["status"], "its fruit is not released yet"
+            await refused(6)
+            station.refusal = None
             station.command_gate.clear()
             await plc.set("execute_command", command_code=1, command_argument=7, command_sequence=1)
             await plc.wait("command_executing")
@@ -116,12 +120,13 @@ def test_every_refusal_is_told_with_its_reason_and_counted(cell, limit_s):
                 ("busy", 5),
                 ("bad_trigger_id", 4),
                 ("queue_full", 6),
+                ("busy", 6),
                 ("recipe_changing", 7),
                 ("station_lost", 8),
                 ("station_lost", 9),
             ]
             counters = await plc.group("counters")
-            assert (counters["count_missed"], counters["count_overrun"], counters["count_accepted"]) == (11, 1, 1)
+            assert (counters["count_missed"], counters["count_overrun"], counters["count_accepted"]) == (12, 1, 1)
             await plc.set("clear_error")
             seen = await plc.read()
             assert not {"missed", "overrun"} & seen["status"]
