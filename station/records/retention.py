@@ -1,11 +1,15 @@
 """Image retention: images removed for space, and lost images after a crash."""
 
-from sqlalchemy import ColumnElement, Connection, delete, func, select
+from sqlalchemy import ColumnElement, Connection, Text, delete, func, literal_column, select
 
 from station.messages import records as messages
 from station.records.holds import is_held
 from station.records.schema import images, inspections
 from station.records.write_requests import add_event, add_images
+
+_OUTCOME = literal_column("+inspections.outcome", Text)
+"""The outcome, never by its index, which has a row for each fruit ever inspected: the `+` keeps SQLite from it, so that
+it reads the images in their order, as many as the quota allows."""
 
 
 def remove_oldest_images(connection: Connection, *, for_accepted: bool) -> tuple[int, list[str]] | None:
@@ -16,10 +20,9 @@ def remove_oldest_images(connection: Connection, *, for_accepted: bool) -> tuple
     Returns:
         The freed bytes and the names of the files that no row refers to any more; None if none may go.
     """
-    accepted = inspections.c.outcome == "PASS"
-    oldest = _oldest(connection, accepted)
+    oldest = _oldest(connection, _OUTCOME == "PASS")
     if oldest is None and not for_accepted:
-        oldest = _oldest(connection, ~accepted)
+        oldest = _oldest(connection, _OUTCOME != "PASS")
     if oldest is None:
         return None
     rows = connection.execute(select(images.c.sha256, images.c.size_bytes).where(images.c.sequence == oldest)).all()

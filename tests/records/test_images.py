@@ -12,11 +12,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from sqlalchemy import event
 
 from station.messages import records as messages
 from station.messages.message import verbatim
+from station.records.database import FILE_NAME, migrate, open_engine
 from station.records.images import ImageStore, accepted_is_stored
 from station.records.model import Image
+from station.records.retention import remove_oldest_images
 
 
 @pytest.fixture
@@ -111,6 +114,24 @@ def test_beyond_the_quota_the_oldest_accepted_go_first_then_the_oldest_rejected(
             assert (await records.inspection(1)).judged is not None, "its record stays"
 
     scenario(steps)
+
+
+def test_what_goes_first_is_sought_among_the_images_and_not_among_all_fruit_ever_inspected(tmp_path):
+    engine = open_engine(tmp_path / FILE_NAME, "rwc")
+    migrate(engine, tmp_path)
+    plans = []
+
+    def explain(connection, _cursor, statement, parameters, _context, _many):
+        found = connection.connection.driver_connection.execute(f"EXPLAIN QUERY PLAN {statement}", parameters)
+        plans.append([row[3] for row in found])
+
+    with engine.begin() as connection:
+        event.listen(engine, "before_cursor_execute", explain)
+        assert remove_oldest_images(connection, for_accepted=False) is None
+    assert len(plans) == 2, "the accepted ones, then the others"
+    for first, *further in plans:
+        assert first == "SCAN images USING COVERING INDEX ix_images_sequence"
+        assert not any("ix_inspections" in step or "TEMP B-TREE" in step for step in further), further
 
 
 def test_no_name_of_a_later_image_is_interned(opened, scenario, inspected, noise, settled, interned):
