@@ -19,7 +19,7 @@ class Priority(StrEnum):
 
 PRIORITIES: dict[Priority, str] = {
     Priority.CRITICAL: "A safety stop is active.",
-    Priority.HIGH: "Bad fruit may be among the good, or the station cannot come back by itself.",
+    Priority.HIGH: "Bad fruit may be among the good, records are lost, or the station cannot come back by itself.",
     Priority.MEDIUM: "Inspections are not made, or good fruit is lost.",
     Priority.LOW: "It can wait for the next pause.",
 }
@@ -63,6 +63,7 @@ class AlarmId(StrEnum):
     HMI_LOST = "hmi_lost"
     OUTBOX_BEHIND = "outbox_behind"
     CONNECTION_FLOOD = "connection_flood"
+    RECORDS_LOST = "records_lost"
 
 
 class AlarmRow(NamedTuple):
@@ -126,6 +127,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     AlarmId.HMI_LOST: AlarmRow(32, Priority.LOW, texts.HMI_LOST),
     AlarmId.OUTBOX_BEHIND: AlarmRow(33, Priority.LOW, texts.OUTBOX_BEHIND),
     AlarmId.CONNECTION_FLOOD: AlarmRow(34, Priority.LOW, texts.CONNECTION_FLOOD),
+    AlarmId.RECORDS_LOST: AlarmRow(35, Priority.HIGH, texts.RECORDS_LOST),
 }
 """Every alarm, in the order of its number."""
 

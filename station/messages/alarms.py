@@ -314,3 +314,20 @@ CONNECTION_FLOOD = AlarmTexts(
         "Find the machine by the address in the detail, end its program, or pull its network cable.",
     ),
 )
+RECORDS_LOST = AlarmTexts(
+    define(
+        "alarm.cause.records_lost",
+        "When the records were opened, their database was damaged or missing; a new, empty one was begun.",
+    ),
+    define(
+        "alarm.consequence.records_lost",
+        "Earlier inspections, lots, recipes' revisions and the audit trail are not in the records. Inspections "
+        "continue, and their numbers go on.",
+    ),
+    define(
+        "alarm.action.records_lost",
+        "Keep the folder that the detail names. Restore the last backup soon, with the station stopped "
+        "(`station records restore`): what was inspected since the loss is then moved aside. Acknowledging ends this "
+        "alarm.",
+    ),
+)

@@ -120,6 +120,7 @@ def _move_damaged_aside(folder: Path, mark: HighWaterMark) -> tuple[Notice, ...]
         if mark.value:
             aside = move_aside(folder, *BELONGING)
             cause = messages.MISSING_DATABASE(path=str(path), number=mark.value)
+            log.error("%s; what it left was moved to %s", cause, aside)
             return (Notice("damaged", cause, messages.FIND_OLD(folder=str(aside))),)
         if not mark.known and (folder / "aside").exists():
             raise _lost_mark(mark)

@@ -119,6 +119,7 @@ class Records:
 
     def _reopen(self) -> None:
         self._shut()
+        self.notices = ()
         try:
             if self._lock is None:
                 self._lock = lock_folder(self.folder)

@@ -74,4 +74,5 @@ PROVOCATIONS: dict[AlarmId, tuple[Provocation, ...]] = {
     AlarmId.HMI_LOST: (Provocation("process", "hmi"),),
     AlarmId.OUTBOX_BEHIND: (Provocation("process", "postgresql_away"),),
     AlarmId.CONNECTION_FLOOD: (Provocation("process", "connections"),),
+    AlarmId.RECORDS_LOST: (Provocation("files", "database_damaged"), Provocation("files", "database_removed")),
 }

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import time
+from collections.abc import Iterable
 
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import FrameFault
@@ -16,9 +17,11 @@ from station.inspection.alarm_table import ALARMS, AlarmId
 from station.inspection.alarms import CAUSED, Alarms
 from station.messages import alarm_commands as messages
 from station.messages.message import Message, message_in, message_of, text_of
+from station.messages.records import FAULT
 from station.records.clock import utc_ms
 from station.records.errors import RecordsError
 from station.records.model import AlarmEntry, AlarmRow
+from station.records.open import Notice
 from station.records.records import Records
 from station.runtime.devices.manager import ARM, CAMERA, GRIPPER
 from station.runtime.devices.rig import FramesError
@@ -111,6 +114,11 @@ class AlarmManager:
         else:
             self.raise_(alarm, detail)
 
+    def report_lost_records(self, notices: Iterable[Notice]) -> None:
+        """Raise the alarm of lost records by the notices of their opening; it stays until it is acknowledged."""
+        for notice in notices:
+            self.update(AlarmId.RECORDS_LOST, FAULT(cause=notice.cause, remedy=notice.remedy))
+
     def set_device_fault(self, device: str, fault: StationError | None) -> None:
         """Raise the alarm of the fault of the `arm`, `gripper` or `camera`, or clear the alarms of a healthy one."""
         told = None if fault is None else alarm_of(device, fault)
@@ -123,7 +131,10 @@ class AlarmManager:
 
     def acknowledge(self, alarm: AlarmId) -> bool:
         """Acknowledge an alarm, and return whether that changed anything."""
-        return self._set(self.alarms.acknowledge(alarm), alarm, "acknowledged")
+        changed = self._set(self.alarms.acknowledge(alarm), alarm, "acknowledged")
+        if changed and alarm is AlarmId.RECORDS_LOST:  # no check ever finds lost records back
+            self.clear(alarm)
+        return changed
 
     def shelve(self, alarm: AlarmId, for_s: float, by: str, reason: str) -> bool:
         """Shelve an alarm for `LONGEST_SHELVED_S` at most, and return whether that changed anything.

@@ -120,7 +120,9 @@ class Housekeeping:
             return
         self._pause_s = min(2 * self._pause_s, self._longest_pause_s)
         if self._service.registry.fault is not None:
-            await self._service.registry.reopen(reserve_bytes=self._reserve_mb * _MB)
+            registry = self._service.registry
+            await registry.reopen(reserve_bytes=self._reserve_mb * _MB)
+            self._service.alarms.report_lost_records(registry.records.notices)
         with contextlib.suppress(StationError):
             if activate:
                 await self._devices.activate_if_safe()
