@@ -196,6 +196,10 @@ CONTINUE_AFTER = define(
 ARCHIVE = define("records.archive", "archive the records' folder and begin a new one")
 GIVE_HIGHER = define("records.give_higher", "give {number} or a higher number", number=Number(0))
 GIVE_HOME = define("records.give_home", "give the station's home folder, or let the station begin one")
+RESTORE_OR_START = define(
+    "records.restore_or_start",
+    "there was one: restore a backup, or start the station, which moves what is left aside and begins a new one",
+)
 OPEN_FIRST = define("records.open_first", "open them first")
 CHECK_DISK = define("records.check_disk", "check the disk, or raise records.deadline_s")
 CHECK_DISK_AND_REPEAT = define("records.check_disk_and_repeat", "check the disk, or ask again")

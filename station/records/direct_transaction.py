@@ -12,19 +12,21 @@ from pathlib import Path
 from sqlalchemy import Connection
 from sqlalchemy.exc import DBAPIError
 
+from station.messages import records as messages
 from station.records.audit import continue_audit, newer_head
 from station.records.audit_head import read_head, try_save_head
 from station.records.database import FILE_NAME, check, migrate, open_engine
 from station.records.error_mapping import map_error
-from station.records.errors import LockedError
-from station.records.open import lock_folder
+from station.records.errors import LockedError, RecordsError
+from station.records.high_water_mark import HighWaterMark
+from station.records.open import MARK_NAME, lock_folder, was_used
 
 
 @contextmanager
 def direct_transaction(folder: Path) -> Iterator[Connection]:
     """Run a transaction: durable when the block has ended, rolled back if it raised.
 
-    If no station has the folder open, a missing database is made, and one of an older schema is migrated.
+    If no station has the folder open, the first database is made, and one of an older schema is migrated.
 
     Raises:
         RecordsError: they cannot be written; nothing was changed.
@@ -54,6 +56,8 @@ def _make_ready(folder: Path) -> None:
         path = folder / FILE_NAME
         if path.exists() and path.stat().st_size:
             check(path)
+        elif was_used(folder, HighWaterMark(folder / MARK_NAME)):  # the start of the station moves the images aside
+            raise RecordsError(messages.NO_RECORDS(path=str(path)), messages.RESTORE_OR_START())
         migrate(open_engine(path, "rwc"), folder)
     finally:
         os.close(lock)

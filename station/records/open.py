@@ -122,7 +122,7 @@ def _move_damaged_aside(folder: Path, mark: HighWaterMark) -> tuple[Notice, ...]
             cause = messages.MISSING_DATABASE(path=str(path), number=mark.value)
             log.error("%s; what it left was moved to %s", cause, aside)
             return (Notice("damaged", cause, messages.FIND_OLD(folder=str(aside))),)
-        if not mark.known and (folder / "aside").exists():
+        if was_used(folder, mark):
             raise _lost_mark(mark)
         return ()
     try:
@@ -135,6 +135,11 @@ def _move_damaged_aside(folder: Path, mark: HighWaterMark) -> tuple[Notice, ...]
         cause = messages.BEGUN_ANEW(cause=error.cause, number=mark.value)
         return (Notice(error.code, cause, messages.RECOVER_OLD(folder=str(aside))),)
     return ()
+
+
+def was_used(folder: Path, mark: HighWaterMark) -> bool:
+    """Check whether a folder without a database has had one: its mark, images or what was moved aside show it."""
+    return mark.value > 0 or (not mark.known and any((folder / name).exists() for name in ("aside", FOLDER_NAME)))
 
 
 def _lost_mark(mark: HighWaterMark) -> SequenceError:

@@ -19,7 +19,9 @@ from sqlalchemy import event
 from station.cli import cli
 from station.messages import records as messages
 from station.messages.message import verbatim
+from station.records.audit import AuditEntry, append_audit
 from station.records.database import FILE_NAME, open_engine
+from station.records.direct_transaction import direct_transaction
 from station.records.errors import (
     DamagedError,
     DiskFullError,
@@ -397,6 +399,36 @@ def test_numbers_are_refused_when_nothing_tells_which_were_given(opened, scenari
             assert await records.begin(trigger) == 701
 
     scenario(steps)
+
+
+@pytest.mark.parametrize("mark_left", [True, False])
+def test_a_command_makes_no_new_database_where_one_was_lost_and_the_images_stay(
+    opened, scenario, trigger, failed, noise, settled, folder, *, mark_left
+):
+    async def inspect():
+        async with opened() as records:
+            await records.conclude(await records.begin(trigger), replace(failed, images=(noise(),)))
+            await settled(records)
+
+    async def start():
+        async with opened():
+            pass
+
+    scenario(inspect)
+    for lost in (*folder.glob(f"{FILE_NAME}*"), *([] if mark_left else [folder / MARK_NAME])):
+        lost.unlink()
+    with (
+        pytest.raises(RecordsError, check=because(messages.NO_RECORDS)),
+        direct_transaction(folder) as connection,
+    ):
+        append_audit(connection, AuditEntry("ada", "service", "calibration.stored", "scale"))
+    assert not (folder / FILE_NAME).exists()
+    if mark_left:
+        scenario(start)
+    else:
+        with pytest.raises(SequenceError, check=because(messages.NUMBERS_UNKNOWN)):
+            scenario(start)
+    assert len(list(folder.glob("aside/*/images/*/*.png" if mark_left else "images/*/*.png"))) == 1
 
 
 def test_a_lost_mark_is_taken_from_the_database_and_an_old_database_from_the_mark(opened, scenario, trigger, folder):
