@@ -59,7 +59,7 @@ class SequenceError(RecordsError):
 
 
 class RecordsDeadlineError(RecordsError):
-    """The deadline passed. The request is then not carried out, or withdrawn, except an outcome under way."""
+    """The deadline passed. The request is not carried out, or withdrawn, except an outcome or a change under way."""
 
     code = "deadline"
 

@@ -288,8 +288,8 @@ class Records:
         return await self._read(lambda connection: read_inspection(connection, sequence, self.folder))
 
     async def save_alarms(self, active: Sequence[AlarmRow], log: Sequence[AlarmEntry] = ()) -> None:
-        """Replace the stored alarms and append to their log, in one transaction."""
-        await self._ask(lambda connection: replace_alarms(connection, active, log))
+        """Replace the stored alarms and append to their log in one transaction, without a deadline."""
+        await self.change_to_end(lambda connection: replace_alarms(connection, active, log))
 
     async def load_alarms(self) -> tuple[AlarmRow, ...]:
         """Return the alarms that were saved last."""
@@ -300,13 +300,13 @@ class Records:
         return await self._ask(lambda connection: add_counts(connection, by))
 
     async def audit(self, *entries: AuditEntry) -> tuple[AuditRow, ...]:
-        """Append to the audit trail, in one transaction.
+        """Append to the audit trail in one transaction, without a deadline.
 
         Raises:
             BadRecordError: an entry is malformed.
             RecordsError: it may not be durable.
         """
-        return await self._ask(lambda connection: tuple(append_audit(connection, entry) for entry in entries))
+        return await self.change_to_end(lambda connection: tuple(append_audit(connection, entry) for entry in entries))
 
     async def change(self, work: Work[T]) -> T:
         """Change lots or holds in the writer's thread, as `lambda connection: start_lot(connection, name, grower)`.

@@ -28,13 +28,15 @@ class AuditLogger:
     def __init__(self, records: Records) -> None:
         self._records = records
         self._waiting: list[AuditEntry] = []
+        self._under_way: tuple[AuditEntry, asyncio.Future[Any]] | None = None
+        """Entry that the records are writing: it goes on when its waiter is cancelled, and is never written again."""
         self._queued = asyncio.Event()
         self._writing = asyncio.Lock()
 
     def log(self, *entries: AuditEntry) -> None:
         """Queue entries to be written."""
         self._waiting += entries
-        if len(self._waiting) > MOST_WAITING:
+        while len(self._waiting) > MOST_WAITING:
             log.error("the audit trail loses its oldest unwritten row: %s", self._waiting.pop(0))
         self._queued.set()
 
@@ -67,16 +69,21 @@ class AuditLogger:
 
     async def _write(self) -> bool:
         async with self._writing:
-            while self._waiting:
-                entry = self._waiting[0]
+            while self._under_way or self._waiting:
+                if self._under_way is None:
+                    entry = self._waiting.pop(0)
+                    self._under_way = entry, asyncio.ensure_future(self._records.audit(entry))
+                entry, writing = self._under_way
                 try:
-                    await self._records.audit(entry)
+                    await asyncio.shield(writing)
                 except BadRecordError:
                     log.exception("the audit trail cannot hold %s", entry)
                 except RecordsError as error:
                     log.warning("the audit trail waits: %s", error)
+                    self._waiting.insert(0, entry)
+                    self._under_way = None
                     return False
-                del self._waiting[0]
+                self._under_way = None
             return True
 
 
