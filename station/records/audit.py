@@ -98,7 +98,7 @@ def continue_audit(connection: Connection, known: Head | None) -> AuditRow | Non
         missing.
     """
     last = last_row(connection)
-    if (known is None and last is None) or (known is not None and has_row(connection, known)):
+    if (known is None and last is None) or (known is not None and _continues(connection, known, last)):
         return None
     if known is None:
         reason = f"{HEAD_NAME} is missing or unreadable: whether these are the last rows of the trail is not known"
@@ -111,7 +111,7 @@ def continue_audit(connection: Connection, known: Head | None) -> AuditRow | Non
 def note_unsigned(connection: Connection, known: Head | None) -> None:
     """Append, at a start, a row if there are rows beyond the signed head: of a killed station, or nobody knows."""
     last = last_row(connection)
-    if known is not None and last is not None and last.seq > known.seq and has_row(connection, known):
+    if known is not None and last is not None and last.seq > known.seq and _continues(connection, known, last):
         append_audit(connection, AuditEntry(STATION, STATION, UNSIGNED, "audit", "", _named(known), _named(last)))
 
 
@@ -137,6 +137,15 @@ def append_restored(connection: Connection, by: str, known: Head | None, new: di
 def has_row(connection: Connection, head: Head) -> bool:
     """Check that the trail has exactly this row."""
     return connection.scalar(select(audit.c.hash).where(audit.c.seq == head.seq)) == head.hash
+
+
+def _continues(connection: Connection, known: Head, last: AuditRow | None) -> bool:
+    """Check that the trail has the known row, or ends with a restore in place of it that could not save its own."""
+    if has_row(connection, known):
+        return True
+    if last is None or last.action != RESTORED or last.old is None:
+        return False
+    return bool(json.loads(last.old)["audit"] == _named(known))
 
 
 def newer_head(connection: Connection, known: Head | None) -> Head | None:

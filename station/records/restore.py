@@ -13,7 +13,7 @@ from sqlalchemy import func, insert, select
 from station.atomic_file import sync_folder
 from station.messages import records as messages
 from station.records.audit import append_restored, newer_head
-from station.records.audit_head import read_head, try_save_head
+from station.records.audit_head import Head, read_head, try_save_head
 from station.records.backup import MARK_NAME, Manifest, copy_image, hash_of, integrity, open_regular, read_manifest
 from station.records.database import FILE_NAME, migrate, move_aside, open_engine
 from station.records.error_mapping import map_error
@@ -61,12 +61,14 @@ def restore_backup(folder: Path, directory: Path, by: str, keys: PublicKeys | No
         mark = HighWaterMark(folder / MARK_NAME)
         mark.value = max(mark.value, manifest.sequence)
         mark.save()
-        _continue(folder, new, manifest, by)
+        head = _continue(folder, new, manifest, by)
         present = [name for name in BELONGING if (folder / name).exists()]
         aside = move_aside(folder, *present) if present else None
         for name in (FOLDER_NAME, FILE_NAME):
             (new / name).rename(folder / name)
         sync_folder(folder)
+        if head is not None:  # not before: the present records never had it, and an interruption leaves them
+            try_save_head(folder, head)
         shutil.rmtree(new)
     except (OSError, sqlite3.Error) as error:
         raise map_error(error, str(folder)) from error
@@ -102,8 +104,12 @@ def _copied(directory: Path, new: Path, manifest: Manifest) -> None:
         sync_folder(subfolder)
 
 
-def _continue(folder: Path, new: Path, manifest: Manifest, by: str) -> None:
-    """Continue what is numbered: the outbox under a new origin, the audit trail with a row of the restore."""
+def _continue(folder: Path, new: Path, manifest: Manifest, by: str) -> Head | None:
+    """Continue what is numbered: the outbox under a new origin, the audit trail with a row of the restore.
+
+    Returns:
+        The trail's head from then on.
+    """
     engine = open_engine(new / FILE_NAME, "rw")
     try:
         migrate(engine, new)
@@ -115,8 +121,6 @@ def _continue(folder: Path, new: Path, manifest: Manifest, by: str) -> None:
             if manifest.missing:
                 forget_missing(connection, frozenset(manifest.missing))
             head = newer_head(connection, None)
-        if head is not None:
-            try_save_head(folder, head)
     except RecordsError:
         raise
     except Exception as error:
@@ -125,3 +129,4 @@ def _continue(folder: Path, new: Path, manifest: Manifest, by: str) -> None:
         connection.execute("PRAGMA journal_mode = DELETE")
     with (new / FILE_NAME).open("rb") as file:
         os.fsync(file.fileno())
+    return head

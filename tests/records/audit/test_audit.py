@@ -1,6 +1,7 @@
 """The audit trail: it only grows, and whatever was done to it behind its back is found."""
 
 import asyncio
+import errno
 import json
 import sqlite3
 
@@ -124,6 +125,51 @@ def test_after_a_restoring_the_trail_is_whole_and_tells_what_is_missing(trail, f
     assert "row 5: it is missing" in station("audit", "verify", "--anchor", lost)[1]
     meddle("UPDATE audit SET old = NULL WHERE action = 'records.restored'")
     assert station("audit", "verify")[0] == 1
+
+
+@pytest.fixture
+def copy(trail, station, tmp_path):
+    """A backup of three rows of a trail of five."""
+    trail(3)
+    assert station("records", "backup", str(tmp_path / "copy"))[0] == 0
+    trail(2)
+    return tmp_path / "copy"
+
+
+@pytest.fixture
+def start(opened, scenario):
+    """Start a station, and end it."""
+
+    async def steps():
+        async with opened():
+            pass
+
+    return lambda: scenario(steps)
+
+
+def test_a_restore_that_fails_leaves_the_head_of_the_present_trail(copy, start, folder, station, monkeypatch):
+    head = (folder / "audit_head").read_bytes()
+    with monkeypatch.context() as patch:
+        patch.setattr("station.records.restore.move_aside", _full)
+        assert station("records", "restore", str(copy), "--by", "Ida")[0] == 1
+    assert (folder / "audit_head").read_bytes() == head
+    start()
+    assert station("audit", "verify")[0] == 0
+
+
+def test_a_restore_whose_head_could_not_be_saved_is_a_note_and_no_break(copy, start, station, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr("station.records.audit_head.save_head", _full)
+        assert station("records", "restore", str(copy), "--by", "Ida")[0] == 0
+    start()
+    code, told = station("audit", "verify")
+    assert code == 0, told
+    assert "Ida put back a backup that ends with row 3; rows up to 5 are in the records that were moved aside" in told
+    assert "without a signed head" in told
+
+
+def _full(*_):
+    raise OSError(errno.ENOSPC, "No space left on device")
 
 
 def test_a_backup_put_back_on_another_machine_has_a_whole_trail(trail, folder, station, tmp_path):
