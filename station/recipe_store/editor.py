@@ -5,13 +5,14 @@ Every change makes an unapproved draft at most; the revision in force does not c
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from station.errors import BadInputError
 from station.messages import recipes as messages
 from station.recipe_store.difference import described_differences
-from station.recipe_store.files import check_unique, locked, read_folder, write_back
+from station.recipe_store.files import check_unique, locked, prepared, read_folder
 from station.recipe_store.history import Person
 from station.recipe_store.reader import BASE
 from station.recipe_store.recipe_state import RecipeState, ValidFile
@@ -143,15 +144,27 @@ class RecipeEditor:
         raise ConflictError(messages.CHANGED_SINCE(**told))
 
     def _put(self, file: ValidFile, text: str, recipe: Recipe, action: str, person: Person) -> None:
-        """Write a file and its audit entry: the entry first, so that no change is made without one."""
+        """Write a file and its audit entry: the entry first, so that no change is made without one.
+
+        All that waits for the disk is done outside of the transaction, in which the station cannot write.
+        """
         old = content_sha256(parse_recipe(file.text, str(file.path))) if file.text else None
         new = {"sha256": content_sha256(recipe), "file": file.path.name}
+        entry = AuditEntry(
+            person.who, person.role, action, f"recipe {recipe.name}", person.reason, {"sha256": old}, new
+        )
+        with prepared(file.path, text, self._home) as put_in_place:
+            self._append(entry)
+            try:
+                put_in_place()
+            except RecipeStoreError as error:
+                unchanged = {"sha256": old, "file": file.path.name, "why": str(error)}
+                self._append(replace(entry, action="recipe.not_written", old=new, new=unchanged))
+                raise
+
+    def _append(self, entry: AuditEntry) -> None:
         with direct_transaction(records_folder(self._home)) as connection:
-            entry = AuditEntry(
-                person.who, person.role, action, f"recipe {recipe.name}", person.reason, {"sha256": old}, new
-            )
             append_audit(connection, entry)
-            write_back(file.path, text, self._home)
 
     def _sites(self) -> Path:
         if self._folder is None or self._folder.resolve() == shipped_folder().resolve():

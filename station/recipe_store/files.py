@@ -2,13 +2,13 @@
 
 import fcntl
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
-from station.atomic_file import write_atomically
+from station.atomic_file import sync_folder, write_atomically
 from station.messages import recipes as messages
 from station.messages import settings as texts
 from station.recipe_store.recipe_state import ValidFile
@@ -102,27 +102,38 @@ def locked(home: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
-def write_back(path: Path, text: str, home: Path) -> Path | None:
-    """Replace a recipe's file atomically; the present text is stored as a backup in the home folder.
+@contextmanager
+def prepared(path: Path, text: str, home: Path) -> Iterator[Callable[[], None]]:
+    """Write a recipe's new file beside the present one, which is stored as a backup in the home folder.
 
-    Returns:
-        The backup; None if there was no file.
-
-    Raises:
-        RecipeStoreError: it could not be written; the file is unchanged.
+    Yields a function that puts the new file in the present one's place, atomically, without a wait for the disk before.
+    Both raise RecipeStoreError if it cannot be written; the present file is then unchanged.
     """
-    backup: Path | None = None
+    new = path.with_name(f".{path.name}.new")
     try:
+        mode = None
         if path.exists():
             stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
             backup = home / BACKUPS / f"{path.stem}-{stamp}{path.suffix}"
             backup.parent.mkdir(parents=True, exist_ok=True)
             write_atomically(backup, path.read_bytes())
-        mode = path.stat().st_mode & 0o777 if path.exists() else None
-        write_atomically(path, text.encode(), mode)
+            mode = path.stat().st_mode & 0o777
+        write_atomically(new, text.encode(), mode)
     except OSError as error:
         raise _unwritable(path, error) from error
-    return backup
+
+    def put_in_place() -> None:
+        try:
+            new.replace(path)
+            sync_folder(path.parent)
+        except OSError as error:
+            raise _unwritable(path, error) from error
+
+    try:
+        yield put_in_place
+    finally:
+        with suppress(OSError):
+            new.unlink(missing_ok=True)
 
 
 def _unwritable(path: Path, error: OSError) -> RecipeStoreError:

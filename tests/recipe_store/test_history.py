@@ -1,11 +1,15 @@
 """A recipe's way from a person's edit to the line: what another person has not approved is never in force."""
 
+import errno
 import json
 import os
 import shutil
+import sqlite3
 import subprocess
+from pathlib import Path
 
 import pytest
+from sqlalchemy.engine.default import DefaultDialect
 
 from station.messages import recipes
 from station.recipe_store.revision import RecipeStoreError
@@ -264,6 +268,59 @@ def test_a_full_or_read_only_disk_changes_nothing(begun, station, does, tmp_path
         assert limit(book_of(folder, home)) == (112.0, "1")
     finally:
         subprocess.run(["umount", "--lazy", disk], check=True)
+
+
+EDIT = ("recipes", "edit", "strawberry", "--set", f"{LIMIT}=113", "--who", "Ida", "--reason", "x")
+
+
+def _full(*_):
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_an_edit_whose_audit_row_cannot_be_written_leaves_the_file(begun, station, site, monkeypatch):
+    before, files = (site / "strawberry.yaml").read_bytes(), sorted(site.iterdir())
+
+    def commit(_dialect, connection):
+        return _full() if connection.total_changes else connection.commit()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(DefaultDialect, "do_commit", commit)
+        assert station(*EDIT)[0] == 1
+    assert (site / "strawberry.yaml").read_bytes() == before
+    assert sorted(site.iterdir()) == files
+    assert "recipe.edited" not in station("audit", "show")[1]
+
+
+def test_the_audit_trail_says_that_an_edited_file_could_not_be_written(begun, station, site, monkeypatch):
+    before, files = (site / "strawberry.yaml").read_bytes(), sorted(site.iterdir())
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "replace", _full)
+        code, told = station(*EDIT)
+    assert code == 1
+    assert "cannot be written: No space left on device" in told
+    assert (site / "strawberry.yaml").read_bytes() == before
+    assert sorted(site.iterdir()) == files
+    told = station("audit", "show", "--action", "recipe.", "--last", "2")[1]
+    assert told.index("recipe.edited") < told.index("recipe.not_written")
+    assert "No space left on device" in told
+
+
+def test_nothing_of_an_edit_waits_for_the_disk_while_the_station_cannot_write(begun, station, site, home, monkeypatch):
+    """In the transaction another writer is locked out: with the new file in place, the row has to be durable."""
+    rows = []
+    put = Path.replace
+
+    def seen(new, path):
+        connection = sqlite3.connect(home / "records" / "records.sqlite3", timeout=0)
+        connection.execute("BEGIN IMMEDIATE")
+        rows.extend(connection.execute("SELECT action FROM audit ORDER BY seq DESC LIMIT 1"))
+        connection.rollback()
+        connection.close()
+        return put(new, path)
+
+    monkeypatch.setattr(Path, "replace", seen)
+    assert station(*EDIT)[0] == 0
+    assert rows == [("recipe.edited",)]
 
 
 def test_the_shipped_files_are_not_edited_in_place(begun, station, monkeypatch):
