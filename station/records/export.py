@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from station.records.csv_cell import csv_cell
 from station.records.database import plain, reading
 from station.records.error_mapping import map_error
 from station.records.high_water_mark import LARGEST
@@ -20,6 +21,8 @@ WINDOW = 10_000
 """Sequence numbers read in one transaction, and rows of one Parquet row group at most."""
 
 _LIST = "(SELECT json_group_array({0}) FROM (SELECT {0} FROM {1} WHERE {1}.sequence = i.sequence ORDER BY {2}))"
+_OUTCOME = "json_extract(i.standing, '$.{}')"
+"""Of the outcome that the PLC got, as other systems get it; the judgement's may differ where that came too late."""
 _TIME = pa.timestamp("ms", tz="UTC")
 
 
@@ -44,14 +47,14 @@ COLUMNS = (
     Column("fruit", pa.string(), "r.name", "the recipe's name"),
     Column("recipe_sha256", pa.string(), "i.recipe_sha256", "of the recipe as it was"),
     Column("outcome", pa.string(), "i.outcome", "what the PLC was told, or is to be told; empty while it runs"),
-    Column("reasons", pa.list_(pa.string()), "json_extract(i.standing, '$.reasons')", "of it, the first one decided"),
+    Column("reasons", pa.list_(pa.string()), _OUTCOME.format("reasons"), "of it, the first one decided"),
     Column("judged", pa.string(), "i.judged", "the station's own view"),
-    Column("area_mm2", pa.float64(), "i.area_mm2", "the contact area that decided"),
-    Column("area_px", pa.int64(), "i.area_px", "the same"),
-    Column("closing_mm", pa.float64(), "i.closing_mm", "where it was measured"),
-    Column("confidence", pa.float64(), "i.confidence", "0 to 1"),
-    Column("late", pa.bool_(), "i.late", "after the deadline"),
-    Column("partial", pa.bool_(), "i.partial", "before the recipe's last step"),
+    Column("area_mm2", pa.float64(), _OUTCOME.format("area_mm2"), "the contact area that decided"),
+    Column("area_px", pa.int64(), _OUTCOME.format("area_px"), "the same"),
+    Column("closing_mm", pa.float64(), _OUTCOME.format("closing_mm"), "where it was measured"),
+    Column("confidence", pa.float64(), _OUTCOME.format("confidence"), "0 to 1"),
+    Column("late", pa.bool_(), _OUTCOME.format("late"), "after the deadline"),
+    Column("partial", pa.bool_(), _OUTCOME.format("partial"), "before the recipe's last step"),
     Column("simulated", pa.bool_(), "i.simulated", "a twin's device took part"),
     Column("published", _TIME, "i.published_utc_ms", "when the PLC was told, UTC"),
     Column("acknowledged", _TIME, "i.acknowledged_utc_ms", "when the PLC took it, UTC"),
@@ -84,9 +87,6 @@ SCHEMA = pa.schema([pa.field(column.name, column.kind) for column in COLUMNS])
 SUFFIXES = (".csv", ".parquet")
 
 Rows = Sequence[Sequence[Any]]
-
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""A spreadsheet takes a text that begins so for a formula; lots' and growers' names come from outside."""
 
 
 def export(folder: Path, query: Query, target: Path) -> int:
@@ -192,4 +192,4 @@ def _text(kind: pa.DataType, value: Any) -> Any:
         return datetime.fromtimestamp(value / 1000, UTC).isoformat(timespec="milliseconds")
     if pa.types.is_boolean(kind):
         return "true" if value else "false"
-    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
+    return csv_cell(value) if isinstance(value, str) else value

@@ -117,8 +117,11 @@ def summarise(folder: Path, name: str) -> LotSummary:
             (name,),
         ).fetchall()
         limits, sized = _limits(ask, recipes[0][2]) if recipes else ((), False)
-        sums = "SELECT avg(duration_ms) / 1000.0, sum(simulated), sum(late) FROM inspections WHERE lot = ?"
-        mean_s, simulated, late = ask(sums, (name,)).fetchone()
+        mean_s, simulated, late = ask(
+            "SELECT avg(duration_ms) / 1000.0, sum(simulated), sum(json_extract(standing, '$.late')) FROM inspections "
+            "WHERE lot = ?",
+            (name,),
+        ).fetchone()
         held = ask(
             "SELECT coalesce('inspection ' || sequence, 'the lot') || ': ' || reason FROM holds "
             "WHERE released_utc_ms IS NULL "
@@ -149,13 +152,13 @@ def summarise(folder: Path, name: str) -> LotSummary:
 
 
 def _areas(ask: Any, name: str) -> tuple[Bin, ...]:
-    condition = "lot = ? AND area_mm2 NOT NULL AND outcome NOT NULL"
-    largest = ask(f"SELECT max(area_mm2) FROM inspections WHERE {condition}", (name,)).fetchone()[0]  # noqa: S608 (a constant)
+    areas = "(SELECT json_extract(standing, '$.area_mm2') AS area_mm2, outcome FROM inspections WHERE lot = ?)"
+    largest = ask(f"SELECT max(area_mm2) FROM {areas}", (name,)).fetchone()[0]  # noqa: S608 (a constant)
     if not largest:
         return ()
     width = largest / BINS
     counts = [Counter[str]() for _ in range(BINS)]
-    query = f"SELECT min(CAST(area_mm2 / ? AS INTEGER), ?), outcome, count(*) FROM inspections WHERE {condition} GROUP BY 1, 2"  # noqa: E501, S608 (a constant)
+    query = f"SELECT min(CAST(area_mm2 / ? AS INTEGER), ?), outcome, count(*) FROM {areas} WHERE area_mm2 NOT NULL GROUP BY 1, 2"  # noqa: E501, S608 (a constant)
     for index, outcome, number in ask(query, (width, BINS - 1, name)):
         counts[max(0, index)][outcome] = number
     return tuple(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from station.messages.message import ENGLISH, Renderer
+from station.records.csv_cell import csv_cell
 from station.whatif.replay import Replayed
 
 BEFORE = ("PASS", "FAIL", "NO_RESULT")
@@ -88,5 +89,7 @@ def as_csv(results: Sequence[Replayed]) -> str:
     table.writerow(["sequence", "lot", "before", "after", "changes_side", "why"])
     for each in results:
         if each.before != each.after:
-            table.writerow([each.sequence, each.lot, each.before, each.after, each.changes_side, each.why or ""])
+            table.writerow(
+                [each.sequence, csv_cell(each.lot), each.before, each.after, each.changes_side, each.why or ""]
+            )
     return text.getvalue()

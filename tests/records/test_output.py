@@ -10,7 +10,9 @@ from dataclasses import replace
 import pyarrow.parquet as pq
 import pytest
 
+from station.channel.line import Reason
 from station.messages import records as messages
+from station.outbox.feed import read_batch
 from station.records import export as exporting
 from station.records.errors import DiskFullError
 from station.records.export import COLUMNS, export
@@ -55,6 +57,32 @@ def test_csv_and_parquet_hold_the_same(history, ask, tmp_path, monkeypatch):
             float(told["fruit_width_mm"]),
         )
         assert (row["recipe_revision"], row["fruit_width_mm"]) == ("", 25.5)
+
+
+def test_an_outcome_that_came_too_late_is_late_in_every_output(opened, scenario, trigger, passed, ask, tmp_path):
+    nothing = {"area_mm2": None, "area_px": None, "closing_mm": None, "confidence": None}
+    late = {"outcome": "NO_RESULT", "reasons": (Reason.LATE,), "late": True, "partial": True, **nothing}
+
+    async def steps():
+        async with opened() as records:
+            judged = await records.conclude(await records.begin(trigger), passed)
+            await records.published(judged.model_copy(update=late))
+            await records.published(await records.conclude(await records.begin(trigger), passed))
+            return [event.data for event in read_batch(records.folder, "s", 0).events if event.kind == "inspection"]
+
+    events = scenario(steps)
+    assert [event["late"] for event in events] == [True, False]
+    ask("export", tmp_path / "all.parquet")
+    rows = pq.read_table(tmp_path / "all.parquet").to_pylist()
+    for name in ("outcome", "reasons", "late", "partial", *nothing):
+        assert [row[name] for row in rows] == [event[name] for event in events]
+    ask("export", tmp_path / "all.csv")
+    with (tmp_path / "all.csv").open(newline="", encoding="utf-8") as file:
+        assert [(row["late"], row["area_mm2"]) for row in csv.DictReader(file)] == [("true", ""), ("false", "31.5")]
+    ask("report", trigger.lot, tmp_path / "lot.html")
+    text = (tmp_path / "lot.html").read_text(encoding="utf-8")
+    assert "1 ended late." in text
+    assert "1 of 2 fruit have an area." in text
 
 
 @pytest.mark.parametrize("name", ["=1+1", "+1", "-1+2", "@SUM(A1)", "\t=1", "\r=1"])

@@ -21,7 +21,7 @@ from station.messages.message import VERBATIM, verbatim
 from station.records.database import FILE_NAME, reading
 from station.vocabulary import Reason
 from station.whatif import runner
-from station.whatif.outcome_table import counted
+from station.whatif.outcome_table import as_csv, counted
 from station.whatif.progress_file import ProgressFile
 from station.whatif.replay import Replayed, replay
 from station.whatif.stored import StoredPress, read_stored
@@ -146,6 +146,12 @@ def test_a_stored_press_is_judged_again_with_its_size_scale_and_gripper(orchard)
         sized, plain = read_stored(connection, made, orchard.folder, with_images=False)
     assert judge(sized.press, orchard.recipe).budget == judge(press, orchard.recipe).budget
     assert (sized.press.size, plain.press.size) == (FruitSize(41.5, 3), NO_SIZE)
+
+
+def test_no_lot_is_a_formula_in_the_table_of_changes():
+    changed = Replayed(1, "=1+1", "PASS", "FAIL", None, faithful=True)
+    (row,) = csv.DictReader(as_csv([changed]).splitlines())
+    assert row["lot"] == "'=1+1"
 
 
 def test_the_command_shows_which_fruit_change_sides_and_goes_on_where_it_was(orchard, draft, station, tmp_path):
