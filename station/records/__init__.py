@@ -1,1 +1,1 @@
-"""Records of the station: inspections with their curves and images, alarms, counters, events, audit trail."""
+"""Records of the station: inspections with their curves and images, alarms, events, audit trail."""

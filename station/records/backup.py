@@ -20,7 +20,7 @@ from station.records.clock import utc_ms
 from station.records.database import FILE_NAME, open_engine, plain, reading
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, DiskFullError, RecordsError
-from station.records.high_water_mark import LARGEST, HighWaterMark
+from station.records.high_water_mark import LARGEST, MARK_NAME, HighWaterMark
 from station.records.images import FOLDER_NAME, image_path
 from station.records.retention import referred
 from station.records.schema_check import check_schema
@@ -29,7 +29,6 @@ from station.records.signing import PublicKeys, is_signed, name_of, sign
 MANIFEST_NAME = "backup.json"
 SIGNATURE_NAME = "backup.sig"
 """The station's Ed25519 signature of the manifest's bytes: 64 bytes, as `openssl pkeyutl -verify -rawin` reads them."""
-MARK_NAME = "sequence"
 _PARTIAL = ".partial"
 _CHUNK_BYTES = 1 << 20
 _LONGEST_MANIFEST_BYTES, _LONGEST_SIGNATURE_BYTES = 1 << 26, 64

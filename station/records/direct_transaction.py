@@ -18,8 +18,8 @@ from station.records.audit_head import read_head, try_save_head
 from station.records.database import FILE_NAME, check, migrate, open_engine
 from station.records.error_mapping import map_error
 from station.records.errors import LockedError, RecordsError
-from station.records.high_water_mark import HighWaterMark
-from station.records.open import MARK_NAME, lock_folder, was_used
+from station.records.high_water_mark import MARK_NAME, HighWaterMark
+from station.records.open import lock_folder, was_used
 
 
 @contextmanager

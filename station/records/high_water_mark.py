@@ -13,6 +13,7 @@ from station.messages import records as messages
 from station.records.errors import SequenceError
 
 LARGEST = 2**32 - 1
+MARK_NAME = "sequence"
 _LINE_BYTES = 20
 
 

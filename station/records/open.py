@@ -17,7 +17,7 @@ from station.records.audit_head import Head, read_head, try_save_head
 from station.records.database import FILE_NAME, check, migrate, move_aside, open_engine
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, LockedError, RecordsError, SequenceError
-from station.records.high_water_mark import HighWaterMark
+from station.records.high_water_mark import MARK_NAME, HighWaterMark
 from station.records.images import FOLDER_NAME, ImageStore
 from station.records.schema import inspections
 from station.records.seals import begin_seals
@@ -26,7 +26,6 @@ from station.records.write_requests import add_event, end_open_inspections
 from station.records.writer import Writer
 from station.settings.records import RecordsSettings
 
-MARK_NAME = "sequence"
 LOCK_NAME = "lock"
 
 BELONGING = (FOLDER_NAME, f"{FILE_NAME}-wal", f"{FILE_NAME}-shm", FILE_NAME)

@@ -5,7 +5,7 @@ import contextlib
 import os
 import shutil
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +26,6 @@ from station.records.open import Notice, Opened, lock_folder, open_records
 from station.records.queries import read_alarms, read_inspection, read_open
 from station.records.write_requests import (
     acknowledge,
-    add_counts,
     begin_again,
     conclude,
     insert_trigger,
@@ -294,10 +293,6 @@ class Records:
     async def load_alarms(self) -> tuple[AlarmRow, ...]:
         """Return the alarms that were saved last."""
         return await self._ask(read_alarms)
-
-    async def count(self, by: Mapping[str, int]) -> dict[str, int]:
-        """Add to counters that outlive restarts, and return all of them."""
-        return await self._ask(lambda connection: add_counts(connection, by))
 
     async def audit(self, *entries: AuditEntry) -> tuple[AuditRow, ...]:
         """Append to the audit trail in one transaction, without a deadline.

@@ -14,11 +14,11 @@ from station.atomic_file import sync_folder
 from station.messages import records as messages
 from station.records.audit import append_restored, newer_head
 from station.records.audit_head import Head, read_head, try_save_head
-from station.records.backup import MARK_NAME, Manifest, copy_image, hash_of, integrity, open_regular, read_manifest
+from station.records.backup import Manifest, copy_image, hash_of, integrity, open_regular, read_manifest
 from station.records.database import FILE_NAME, migrate, move_aside, open_engine
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, RecordsError
-from station.records.high_water_mark import HighWaterMark
+from station.records.high_water_mark import MARK_NAME, HighWaterMark
 from station.records.images import FOLDER_NAME, image_path
 from station.records.open import BELONGING, lock_folder
 from station.records.retention import forget_missing, referred

@@ -238,6 +238,7 @@ counters = Table(
     Column("name", Text, primary_key=True),
     Column("value", Integer, nullable=False),
 )
+"""Of earlier schemas; nothing writes it."""
 
 events = Table(
     "events",

@@ -6,7 +6,6 @@ from typing import Any, Literal
 
 from pydantic import ValidationError
 from sqlalchemy import Connection, bindparam, delete, insert, select, update
-from sqlalchemy.dialects.sqlite import insert as upsert
 
 from station.channel.line import Outcome, Reason
 from station.messages import records as messages
@@ -17,7 +16,6 @@ from station.records.model import AlarmEntry, AlarmRow, CurvePoint, InspectionRe
 from station.records.schema import (
     alarms,
     alarms_log,
-    counters,
     curve_points,
     events,
     images,
@@ -215,14 +213,6 @@ def replace_alarms(connection: Connection, active: Sequence[AlarmRow], log: Sequ
         connection.execute(insert(alarms), [asdict(row) for row in active])
     if log:
         connection.execute(insert(alarms_log), [asdict(entry) for entry in log])
-
-
-def add_counts(connection: Connection, by: Mapping[str, int]) -> dict[str, int]:
-    """Add to counters and return all."""
-    for name, number in by.items():
-        row = upsert(counters).values(name=name, value=number)
-        connection.execute(row.on_conflict_do_update(["name"], set_={"value": counters.c.value + number}))
-    return {row.name: row.value for row in connection.execute(select(counters))}
 
 
 def add_event(connection: Connection, name: str, sequence: int | None, details: Mapping[str, Any]) -> None:

@@ -32,9 +32,8 @@ from station.records.errors import (
     SequenceError,
     UnknownInspectionError,
 )
-from station.records.high_water_mark import HighWaterMark
+from station.records.high_water_mark import MARK_NAME, HighWaterMark
 from station.records.model import RecipeSnapshot, Trigger
-from station.records.open import MARK_NAME
 from station.records.records import Records
 from station.records.short_transaction import short_transaction
 from tests.records.causes import because
