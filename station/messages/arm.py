@@ -23,7 +23,8 @@ REMEDY_EMERGENCY_STOP = define(
     "Make the cell safe, release the emergency stop button, then power on and release the brakes",
 )
 REMEDY_SAFEGUARD_STOP = define(
-    "arm.remedy_safeguard_stop", "Close the guard or clear the light curtain, then upload the program again"
+    "arm.remedy_safeguard_stop",
+    "Close the guard or clear the light curtain, make sure that nobody is at the arm, then upload the program again",
 )
 REMEDY_SAFETY_FAULT = define(
     "arm.remedy_safety_fault",
@@ -60,7 +61,10 @@ REMEDY_CLOSED = define("arm.remedy_closed", "Open the arm again")
 EMERGENCY_STOP = define("arm.emergency_stop", "an emergency stop is active")
 SAFETY_FAULT = define("arm.safety_fault", "the safety system reports a violation or a fault")
 PROTECTIVE_STOP = define("arm.protective_stop", "the arm is in a protective stop")
-SAFEGUARD_STOP = define("arm.safeguard_stop", "a safeguard stop is active")
+SAFEGUARD_STOP = define("arm.safeguard_stop", "a safeguard stop, as by an open guard, has stopped the arm")
+STOPPED_FOR_SAFETY = define(
+    "arm.stopped_for_safety", "the arm's safety system has stopped it; the pendant shows the reason"
+)
 NOT_POWERED = define("arm.not_powered", "the arm is not powered, or its brakes are on")
 BUTTON_PRESSED = define("arm.button_pressed", "an emergency stop button is still pressed")
 LOCAL_CONTROL = define(

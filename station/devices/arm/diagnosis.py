@@ -9,15 +9,18 @@ from station.messages.message import VERBATIM, Message
 RUNNING = 7
 """RTDE `robot_mode`: powered, brakes released."""
 PLAYING = 2
-"""RTDE `runtime_state`."""
+STOPPED = frozenset({0, 1})
+"""RTDE `runtime_state`: 0 is stopping, 1 stopped. A program in any other one, as paused, may still move the arm."""
 
 SAFETY_CAUSES: tuple[tuple[int, ArmCause, Message], ...] = (
     (1 << 5 | 1 << 6 | 1 << 7, ArmCause.EMERGENCY_STOP, messages.EMERGENCY_STOP()),
     (1 << 8 | 1 << 9, ArmCause.SAFETY_FAULT, messages.SAFETY_FAULT()),
     (1 << 2, ArmCause.PROTECTIVE_STOP, messages.PROTECTIVE_STOP()),
     (1 << 4, ArmCause.SAFEGUARD_STOP, messages.SAFEGUARD_STOP()),
+    (1 << 3 | 1 << 10, ArmCause.SAFEGUARD_STOP, messages.STOPPED_FOR_SAFETY()),
 )
-"""Bits of RTDE `safety_status_bits` (RTDE guide), the gravest first."""
+"""Bits of RTDE `safety_status_bits` (RTDE guide), the gravest first. The last row is the recovery mode, and stops that
+have no bit of their own, as by a three-position enabling device."""
 
 STATE_CAUSES = {ArmCause.NOT_POWERED, *(cause for _, cause, _ in SAFETY_CAUSES)}
 """Causes whose start and end the state alone shows."""

@@ -12,7 +12,7 @@ import time
 from typing import NoReturn
 
 from station.devices.arm.dashboard import dashboard
-from station.devices.arm.diagnosis import PLAYING, STATE_CAUSES, diagnose, from_output, from_state
+from station.devices.arm.diagnosis import PLAYING, STATE_CAUSES, STOPPED, diagnose, from_output, from_state
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.messages import (
     Beat,
@@ -39,6 +39,7 @@ LONGEST_PAUSE_S = 3.0
 UPLOAD_TRIES = 3
 SETTLE_S = 0.5
 FIRST_LEASE_S = 2.0
+END_AGAIN_S = 1.0
 PROCESS_START_LIMIT_S = 60.0
 """As the supervisor gives each of the station's processes."""
 SELF_HEALING = {ArmCause.LINK_LOST, ArmCause.STALE, ArmCause.DEADLINE}
@@ -57,6 +58,7 @@ class ArmLink:
         self._failures = 0
         self._healthy_until_s = 0.0
         self._was_healthy = True
+        self._end_again_s = 0.0
         self._lock = asyncio.Lock()
         self._maintaining: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
@@ -275,15 +277,28 @@ class ArmLink:
             self._was_healthy = True
         seen = from_state(snapshot)
         latched = self._latched.cause if self._latched is not None else None
-        if seen is not None:
-            if seen.cause is not latched:
-                self._set(seen)
+        if seen is not None and seen.cause is not latched:
+            self._set(seen)
+        if seen is not None or latched is ArmCause.SAFEGUARD_STOP:
+            await self._end_program(snapshot)
         elif latched is not None and latched not in STATE_CAUSES:
             return
         elif snapshot.runtime_state != PLAYING:
             self._store_or_raise(await self._explain(None))
+            await self._end_program(snapshot)
         elif self._lost is not None:
             self._set(None)
+
+    async def _end_program(self, snapshot: Snapshot) -> None:
+        """Stop a program that is only paused, as by an open guard: it would complete its motion when the guard closes.
+
+        That the dashboard server stops a paused program is unverified on hardware; it is ordered until it has.
+        """
+        if snapshot.runtime_state in STOPPED or time.monotonic() < self._end_again_s:
+            return
+        self._end_again_s = time.monotonic() + END_AGAIN_S
+        async with dashboard(self._settings.host) as conversation:
+            await conversation.request("stop")
 
     async def _connect(self) -> ArmProcess:
         async with dashboard(self._settings.host):

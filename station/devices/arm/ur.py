@@ -9,7 +9,7 @@ from typing import Self
 
 from station.devices.arm.arm import ArmState
 from station.devices.arm.dashboard import DashboardConversation, dashboard
-from station.devices.arm.diagnosis import PLAYING
+from station.devices.arm.diagnosis import PLAYING, STOPPED
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.link import ArmLink
 from station.devices.arm.messages import Beside, Halt, Move, Position, Reachable, Six, Snapshot
@@ -142,7 +142,8 @@ class UrArm:
     async def stop(self) -> None:
         """See `Arm.stop`; a `move_to` that is under way ends."""
         self._stopped.set()
-        if self._link.fault is None:
+        snapshot = await self._fresh_enough()
+        if self._link.lost is None and (snapshot is None or snapshot.runtime_state == PLAYING):
             await self._brake()
         deadline_s = time.monotonic() + self._settings.call_deadline_s
         while time.monotonic() < deadline_s:
@@ -304,8 +305,8 @@ async def _require_remote(conversation: DashboardConversation) -> None:
 
 
 def _moves(snapshot: Snapshot) -> bool:
-    # A program that was stopped leaves its report of a motion behind.
-    begun = snapshot.underway and snapshot.runtime_state == PLAYING
+    # A program that was stopped leaves its report of a motion behind; one that is paused continues the motion.
+    begun = snapshot.underway and snapshot.runtime_state not in STOPPED
     return begun or max(map(abs, snapshot.speeds_rad_s)) > AT_REST_RAD_S
 
 

@@ -1,7 +1,7 @@
 """The arm itself: joints that move in real time along a path."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from station.twin.ur.kinematics import JOINT_RANGE_RAD, Joints, forward, inverse, nearest
 from station.twin.ur.paths import JointPath, Path, ToolPath, UnreachableError
@@ -25,6 +25,8 @@ class Body:
         self.tcp_offset: Pose = NO_OFFSET
         self._path: Path | None = None
         self._profile: Profile | None = None
+        self._motion: Callable[[], None] | None = None
+        self._paused: Callable[[], None] | None = None
         self._elapsed_s = 0.0
         self._speed = 0.0
         self._travel = 0.0
@@ -67,6 +69,7 @@ class Body:
         path = JointPath.between(self.joints_rad, target)
         speed = min(speed_rad_s, path.speed_limit_rad_s())
         self._begin(path, Trapezoid(path.length, speed, acceleration_rad_s2))
+        self._motion = lambda: self.move_joints(target, speed_rad_s, acceleration_rad_s2)
 
     def move_tool(self, target: Pose, speed_m_s: float, acceleration_m_s2: float) -> None:
         """Begin a straight motion of the tool.
@@ -80,6 +83,18 @@ class Body:
         if not self.within_range(path.end_joints) or path.steepest() * profile.peak_speed > 1.0:
             raise UnreachableError("a joint would leave its range or exceed its speed on the straight way")
         self._begin(path, profile)
+        self._motion = lambda: self.move_tool(target, speed_m_s, acceleration_m_s2)
+
+    def pause(self, deceleration_rad_s2: float) -> None:
+        """Brake as `brake`, and remember the motion for `resume`."""
+        motion = self._motion if self.moving else None
+        self.brake(deceleration_rad_s2)
+        self._paused = motion
+
+    def resume(self) -> None:
+        """Begin the motion again that `pause` interrupted; none after a stop in between."""
+        if self._paused is not None:
+            self._paused()
 
     def brake(self, deceleration_rad_s2: float) -> None:
         """Come to rest on the path, the leading joint at a deceleration; nothing happens to an arm at rest."""
@@ -121,6 +136,7 @@ class Body:
         return all(abs(q) <= self._joint_range_rad for q in joints_rad)
 
     def _come_to_rest(self, pace: float, deceleration: float) -> None:
+        self._motion = self._paused = None
         if self._path is None or self._speed == 0.0:
             self._rest()
             return
@@ -129,7 +145,7 @@ class Body:
         self._elapsed_s = 0.0
 
     def _begin(self, path: Path, profile: Profile) -> None:
-        self._path, self._profile = path, profile
+        self._path, self._profile, self._paused = path, profile, None
         self._elapsed_s = self._travel = self._speed = 0.0
         if path.length == 0.0:
             self._rest()

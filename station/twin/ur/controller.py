@@ -26,6 +26,7 @@ START_POSE_RAD: Joints = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
 
 OWN_FAULTS = (
     "protective_stop",
+    "safeguard",
     "emergency_stop",
     "local_mode",
     "pendant_stop",
@@ -56,6 +57,7 @@ class UrController:
         delayed: everything that is sent comes later by the amount, s.
         intermittent: every amount of seconds all connections are cut; new ones are taken.
         protective_stop: switching it on is the event; it stays until it is unlocked.
+        safeguard: the guard is open as long as it is on: the program is paused, and continues its motion afterwards.
         emergency_stop: the button is pressed as long as it is on.
         local_mode: local control as long as it is on; script and primary connections drop.
         pendant_stop: switching it on stops the program.
@@ -227,6 +229,7 @@ class UrController:
             self._switching = asyncio.create_task(self._switch_network(on=not faults & reachable))
         if CommonFault.OFF in ended:
             self._boot(self.body.joints_rad, running=False)
+        self.safety.guard_open = "safeguard" in faults
 
     def _begin_faults(self, begun: frozenset[str], now_s: float) -> None:
         if "protective_stop" in begun:

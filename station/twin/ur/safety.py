@@ -27,6 +27,7 @@ class SafetyMode(IntEnum):
 
     NORMAL = 1
     PROTECTIVE_STOP = 3
+    SAFEGUARD_STOP = 5
     ROBOT_EMERGENCY_STOP = 7
     FAULT = 9
 
@@ -34,10 +35,12 @@ class SafetyMode(IntEnum):
 SAFETY_BITS: dict[SafetyMode, int] = {
     SafetyMode.NORMAL: 1 << 0,
     SafetyMode.PROTECTIVE_STOP: 1 << 2 | 1 << 10,
+    SafetyMode.SAFEGUARD_STOP: 1 << 4 | 1 << 10,
     SafetyMode.ROBOT_EMERGENCY_STOP: 1 << 6 | 1 << 7 | 1 << 10,
     SafetyMode.FAULT: 1 << 9 | 1 << 10,
 }
-"""RTDE `safety_status_bits` of each mode: normal 0, protective 2, robot 6 and any emergency 7, fault 9, stopped 10."""
+"""RTDE `safety_status_bits` of each mode: normal 0, protective 2, safeguard 4, robot 6, any emergency 7, fault 9,
+stopped 10."""
 
 
 class Safety:
@@ -46,6 +49,7 @@ class Safety:
     def __init__(self, *, running: bool) -> None:
         self.robot_mode = RobotMode.RUNNING if running else RobotMode.POWER_OFF
         self.remote = True
+        self.guard_open = False
         self._emergency = False
         self._protective_since_s: float | None = None
         self._faulty = False
@@ -61,6 +65,8 @@ class Safety:
             return SafetyMode.FAULT
         if self._protective_since_s is not None:
             return SafetyMode.PROTECTIVE_STOP
+        if self.guard_open and self.robot_mode is RobotMode.RUNNING:
+            return SafetyMode.SAFEGUARD_STOP
         return SafetyMode.NORMAL
 
     @property

@@ -13,7 +13,7 @@ from station.twin.ur.kinematics import Joints
 from station.twin.ur.paths import UnreachableError
 from station.twin.ur.poses import Pose, pose_from_transform, transform_from_pose
 from station.twin.ur.registers import Registers
-from station.twin.ur.safety import Safety
+from station.twin.ur.safety import Safety, SafetyMode
 
 START_S = 0.05
 """From the upload to the script's first cycle; a real controller compiles for some hundred milliseconds."""
@@ -47,6 +47,7 @@ class ControlScript:
         self._busy: Callable[[], bool] | None = None
         self._executing = False
         self._async_running = False
+        self._resumes = False
         self._stops_straight = False
         self._watchdog_s: float | None = None
         self._watched_since_s = 0.0
@@ -140,13 +141,19 @@ class ControlScript:
 
     def _follow_safety(self) -> None:
         if self._safety.may_move and self._safety.remote:
-            if self.runtime_state is RuntimeState.PAUSED:
+            if self.runtime_state is RuntimeState.PAUSED and self._resumes:
+                self.runtime_state = RuntimeState.PLAYING
+                self._watched_since_s = self._now_s  # whether a real watchdog expires in a pause is not known
+                self._body.resume()
+            elif self.runtime_state is RuntimeState.PAUSED:
                 self.end("the protective stop was unlocked")
             return
-        if self._safety.powered and not self._safety.may_move and self.runtime_state is RuntimeState.PLAYING:
-            self.runtime_state = RuntimeState.PAUSED
-            self._body.brake(SAFETY_BRAKE_RAD_S2)
-        elif not self._safety.powered or not self._safety.remote:
+        if self._safety.powered and self._safety.remote and self.runtime_state is RuntimeState.PLAYING:
+            self.runtime_state, self._resumes = RuntimeState.PAUSED, True
+            self._body.pause(SAFETY_BRAKE_RAD_S2)
+        if self._safety.safety_mode is not SafetyMode.SAFEGUARD_STOP:
+            self._resumes = False
+        if not self._safety.powered or not self._safety.remote:
             self.end("the arm lost its power" if self._safety.remote else "the controller was put into local control")
 
     def _serve(self, now_s: float) -> None:

@@ -442,6 +442,7 @@ def test_the_dashboard_answers_line_by_line(bench, until):
         ("local_mode", ["fault", "ok", "ok"], messages.REMEDY_LOCAL_CONTROL),
         ("emergency_stop", ["fault", "ok", "ok"], messages.REMEDY_EMERGENCY_STOP),
         ("protective_stop", ["fault", "ok", "ok"], messages.REMEDY_PROTECTIVE_STOP),
+        ("safeguard", ["fault", "ok", "ok"], messages.REMEDY_SAFEGUARD_STOP),
         ("registers_in_use", ["ok", "warning", "ok"], messages.REMEDY_REGISTERS_IN_USE),
         ("rtde_silent", ["ok", "fault", "ok"], messages.CHECK_RTDE_LATE),
         ("stuck", ["ok", "fault", "ok"], messages.CHECK_RTDE_FROZEN),

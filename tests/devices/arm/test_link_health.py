@@ -1,4 +1,4 @@
-"""Whose stop it was: one on the pendant, or the watchdog's after a lapse of the station's health."""
+"""Whose stop it was: on the pendant, by the watchdog after a lapse of the station's health, or by an open guard."""
 
 import asyncio
 import contextlib
@@ -20,7 +20,7 @@ STOPPED = PLAYING - 1
 class Process:
     """The ur-rtde process of a powered arm in remote control."""
 
-    state, kicks_late = PLAYING, False
+    state, kicks_late, safety_bits = PLAYING, False, 1
 
     async def request(self, _request, _reply, *, deadline_s):
         return Snapshot(
@@ -29,7 +29,7 @@ class Process:
             speeds_rad_s=SIX,
             tool_pose=SIX,
             robot_mode=7,
-            safety_bits=1,
+            safety_bits=self.safety_bits,
             runtime_state=self.state,
             commanding=True,
             underway=False,
@@ -38,19 +38,33 @@ class Process:
 
 
 class Dashboard:
+    def __init__(self, requests):
+        self._requests = requests
+
+    async def request(self, command):
+        self._requests.append(command)
+        return "Stopped"
+
     async def facts(self):
         return DashboardFacts("5.22", "1", "UR10", "RUNNING", "NORMAL", remote=True)
 
 
-@contextlib.asynccontextmanager
-async def dashboard(_host):
-    yield Dashboard()
+@pytest.fixture
+def dashboard_requests(monkeypatch):
+    """The commands to the dashboard server."""
+    requests: list[str] = []
+
+    @contextlib.asynccontextmanager
+    async def dashboard(_host):
+        yield Dashboard(requests)
+
+    monkeypatch.setattr(link, "dashboard", dashboard)
+    return requests
 
 
 @pytest.fixture
-def cause_after(monkeypatch):
+def cause_after(dashboard_requests):
     """The cause of a stop after some beats; of each: is the station healthy, the program's state, late kicks."""
-    monkeypatch.setattr(link, "dashboard", dashboard)
 
     def run(*beats):
         async def scenario():
@@ -88,3 +102,39 @@ WELL, LAPSE = (True, PLAYING, False), (False, PLAYING, False)
 )
 def test_a_stop_is_the_watchdogs_only_where_it_was_left_without_kicks(cause_after, beats, cause):
     assert cause_after(*beats) is cause
+
+
+PAUSED, RESUMING = 4, 5
+GUARD_OPEN = 1 << 4 | 1 << 10
+
+
+@pytest.mark.parametrize("afterwards", [STOPPED, PAUSED, RESUMING, PLAYING])
+def test_a_program_that_an_open_guard_has_paused_is_stopped_and_the_guard_remains_the_cause(
+    dashboard_requests, monkeypatch, afterwards
+):
+    monkeypatch.setattr(link, "END_AGAIN_S", 0.0)
+
+    async def scenario():
+        process: Any = Process()
+        arm = link.ArmLink(ArmSettings())
+        arm._process = process
+        arm.renew_health(60.0)
+        arm._up()
+        process.state, process.safety_bits = PAUSED, GUARD_OPEN
+        await arm._watch(process)
+        assert dashboard_requests == ["stop"]
+        dashboard_requests.clear()
+        arm.renew_health(-0.05)  # the watchdog is not kicked in a pause, and may have stopped the program
+        process.state, process.safety_bits, process.kicks_late = afterwards, 1, True
+        await arm._watch(process)
+        assert dashboard_requests == ([] if afterwards is STOPPED else ["stop"])
+        return arm.fault
+
+    fault = asyncio.run(scenario())
+    assert fault is not None
+    assert fault.cause is ArmCause.SAFEGUARD_STOP
+
+
+def test_a_paused_program_is_stopped_also_where_no_bit_shows_why(cause_after, dashboard_requests):
+    assert cause_after(WELL, (True, PAUSED, False)) is ArmCause.PROGRAM_STOPPED
+    assert dashboard_requests == ["stop"]

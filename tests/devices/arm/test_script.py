@@ -143,6 +143,43 @@ def test_a_straight_way_out_of_reach_is_a_protective_stop():
     assert played.script.runtime_state is RuntimeState.STOPPED
 
 
+@pytest.mark.parametrize("straight", [False, True])
+def test_a_safeguard_stop_pauses_the_program_and_its_motion_goes_on_afterwards(straight):
+    played = Played()
+    x, y, z, *turn = played.body.tool_pose()
+    target = (x, y, z - 0.2, *turn) if straight else AWAY
+    played.write(3 if straight else 1, (*target, 0.25, 1.0), integer=1)
+    played.clear()
+    played.run(0.3)
+    played.safety.guard_open = True
+    played.run(1.0)
+    assert played.script.runtime_state is RuntimeState.PAUSED
+    assert played.safety.bits == 1 << 4 | 1 << 10
+    assert not played.body.moving
+    assert played.progress[2]
+    played.safety.guard_open = False
+    played.run(6.0)
+    assert played.script.runtime_state is RuntimeState.PLAYING
+    reached = played.body.tool_pose() if straight else played.body.joints_rad
+    assert reached == pytest.approx(target, abs=1e-6)
+    assert not played.progress[2]
+
+
+def test_a_program_that_was_stopped_while_the_guard_was_open_does_not_go_on():
+    played = Played()
+    played.write(1, (*AWAY, 1.0, 2.0), integer=1)
+    played.clear()
+    played.run(0.3)
+    played.safety.guard_open = True
+    played.run(0.1)
+    played.script.end("the dashboard stopped the program")
+    played.safety.guard_open = False
+    played.run(2.0)
+    assert played.script.runtime_state is RuntimeState.STOPPED
+    assert not played.body.moving
+    assert played.body.joints_rad[0] < 0.5
+
+
 def test_the_watchdog_hears_every_write_and_stops_a_program_that_it_does_not_hear_from():
     played = Played()
     played.write(35, (5.0,))

@@ -210,6 +210,42 @@ def test_a_protective_stop_in_mid_move_waits_for_a_person_and_for_its_five_secon
     asyncio.run(run())
 
 
+def test_an_arm_behind_a_guard_that_was_opened_does_not_go_on_when_it_closes(healthy_arm, until):
+    async def run():
+        async with healthy_arm(poses=AWAY) as (bench, arm):
+            bench.faults.set("slow", A_TENTH)
+            move = asyncio.create_task(arm.move_to("home"))
+            await until(lambda: moving(bench))
+            bench.faults.set("safeguard")
+            assert await cause_of(move) is ArmCause.SAFEGUARD_STOP
+            await arm.stop()
+            assert bench.controller.script.ended_because == "the dashboard stopped the program"
+            bench.faults.clear()
+            await until(lambda: bench.controller.safety.may_move)
+            assert await cause_of(arm.move_to("home")) is ArmCause.SAFEGUARD_STOP
+            assert not bench.controller.body.moving
+            assert (await arm.state()).at is None
+            await arm.upload_again()
+            await arm.move_to("home")
+            assert (await arm.state()).at == "home"
+
+    asyncio.run(run())
+
+
+def test_a_stop_brakes_an_arm_that_moves_whatever_fault_waits_for_a_person(healthy_arm, until):
+    async def run():
+        async with healthy_arm(poses=AWAY) as (bench, arm):
+            bench.faults.set("slow", A_TENTH)
+            move = asyncio.create_task(arm.move_to("home"))
+            await until(lambda: moving(bench))
+            arm._link._set(ArmFault(ArmCause.PROGRAM_STOPPED, messages.PROGRAM_STOPPED()))
+            assert await cause_of(move) is ArmCause.PROGRAM_STOPPED
+            await arm.stop()
+            assert not bench.controller.body.moving
+
+    asyncio.run(run())
+
+
 def test_an_emergency_stop_needs_the_button_then_power_then_brakes(healthy_arm, until):
     async def run():
         async with healthy_arm(poses=AWAY) as (bench, arm):
