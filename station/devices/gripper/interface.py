@@ -66,6 +66,14 @@ class Gripper(Protocol):
         """Return the widest gap for fruit."""
         ...
 
+    @property
+    def known_width_mm(self) -> float | None:
+        """Return the gap at which the fingers were last read at rest; None if they may be elsewhere.
+
+        A gripper without its activation reports positions that mean nothing, after a loss of power even an open one.
+        """
+        ...
+
     async def activate(self) -> GripperReading:
         """Make the gripper ready. Idempotent: one that is active does not move.
 

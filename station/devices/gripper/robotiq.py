@@ -73,6 +73,8 @@ class Robotiq2F85:
         self._stops = 0
         self._held_request: int | None = None
         self._mute_since_s: float | None = None
+        self.known_width_mm: float | None = None
+        """Gap at which the fingers were last read at rest while active; None once they were sent elsewhere."""
 
     @property
     def max_width_mm(self) -> float:
@@ -94,7 +96,7 @@ class Robotiq2F85:
             status, at_s = await self._poll()
             if self._is_active(status):
                 return self._reading(status, at_s)
-            self._held_request = None
+            self._held_request = self.known_width_mm = None
             deadline_s = time.monotonic() + self._settings.activation_timeout_s
             await self.link.reset()
             while (await self._poll())[0].state != State.RESET:
@@ -148,7 +150,10 @@ class Robotiq2F85:
             try:
                 sent = min(count, before.position + stride)
                 while True:
-                    await self.link.go_to(sent, speed, force)
+                    try:
+                        await self.link.go_to(sent, speed, force)
+                    finally:
+                        self.known_width_mm = None
                     renewed_at = stride // 2 if sent < count else None
                     status, at_s = await self._arrival(sent, deadline_s, stops, renewed_at)
                     if sent == count or _OBJECT_STATES[status.object_] == ObjectState.CONTACT_CLOSING:
@@ -187,7 +192,11 @@ class Robotiq2F85:
 
     async def _poll(self) -> tuple[Status, float]:
         at_s = time.monotonic()
-        return await self.link.status(), at_s
+        status = await self.link.status()
+        if status.state == State.ACTIVE:
+            at_rest = not status.go_to or _OBJECT_STATES[status.object_] != ObjectState.MOVING
+            self.known_width_mm = width_of_count(status.position, self._calibration) if at_rest else None
+        return status, at_s
 
     async def _ready(self) -> tuple[Status, float]:
         """Return the status of a gripper that may move."""

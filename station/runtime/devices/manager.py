@@ -226,7 +226,7 @@ class DeviceManager:
         """Activate a gripper that lost its activation, unless a fruit may be between the jaws: it would be crushed.
 
         Nothing is between them if the arm is away from the nest, or a person has confirmed it. With the jaws open at
-        the nest the arm leaves the nest first.
+        the nest the arm leaves the nest first; a gripper that was without power cannot report whether they are open.
 
         Raises:
             StationError: activation is not safe, with the remedy; or it failed.
@@ -237,7 +237,7 @@ class DeviceManager:
             return
         try:
             if not self._confirmed_clear:
-                await self._leave_the_nest(reading.width_mm)
+                await self._leave_the_nest()
             self._confirmed_clear = False
             await self.cell.gripper.activate()
         except (GripperNotActiveError, GripperFaultError) as error:
@@ -248,14 +248,15 @@ class DeviceManager:
             raise
         self._not_activated = None
 
-    async def _leave_the_nest(self, width_mm: float) -> None:
+    async def _leave_the_nest(self) -> None:
         refusal = GripperNotActiveError(gripper_messages.JAWS_UNKNOWN(), gripper_messages.REMEDY_EMPTY_JAWS())
         if self._arm is None:
             raise refusal
         state = await self._arm.state()
         if state.fault is not None:
             raise state.fault.again()
-        if state.at == "nest" and are_open(width_mm, self.cell.gripper.max_width_mm):
+        gripper, width_mm = self.cell.gripper, self.cell.gripper.known_width_mm
+        if state.at == "nest" and width_mm is not None and are_open(width_mm, gripper.max_width_mm):
             await self._arm.move_to("above_nest")
         elif state.at not in {"home", "above_nest"}:
             raise refusal

@@ -55,6 +55,8 @@ class GripperFault(StrEnum):
     """An activation ends in gFLT 0x0D instead of the active state."""
     OVERCURRENT = "overcurrent"
     """gFLT 0x0E, latched until reset and activation."""
+    POWER_CUT = "power_cut"
+    """Switching it on is the event: without power for a moment, then without activation and at position 0 until it."""
     EMERGENCY_STOPPED = "emergency_stopped"
     """The URCap answers `?` and the fingers stop for good; over Modbus the registers can still be read."""
 

@@ -69,6 +69,7 @@ class RobotiqGripper:
         self._latched = Code.NONE
         self._legs: list[_Leg] = []
         self._in_motion = False
+        self._calibrated = True
 
     def opening_mm(self, now_s: float) -> float:
         """The distance between the gripper's own pads; a time already passed gives the latest opening."""
@@ -91,7 +92,7 @@ class RobotiqGripper:
             object_=self._object,
             fault=self._fault(),
             echo=(self._command.position + offset) % 256,
-            position=(self._fingers.count(self._opening_mm) + offset) % 256,
+            position=(self._fingers.count(self._opening_mm) + offset) % 256 if self._calibrated else 0,
             current=moving_current(self._reaction_n(self._opening_mm)) if self._in_motion else 0,
         )
 
@@ -185,6 +186,9 @@ class RobotiqGripper:
             self._go_to(remaining_s)
 
     def _take_faults(self) -> None:
+        if GripperFault.POWER_CUT in self.faults.take_new():
+            self._command, self._state, self._latched = Command(), _State.RESET, Code.NONE
+            self._legs, self._calibrated = [], False
         for fault, code in MAJOR.items():
             if not self._latched and self.faults.active(fault):
                 self._latch(code)
@@ -202,7 +206,7 @@ class RobotiqGripper:
         elif self.faults.active(GripperFault.ACTIVATION_FAULT):
             self._latch(Code.ACTIVATION)
         else:
-            self._state = _State.ACTIVE
+            self._state, self._calibrated = _State.ACTIVE, True
 
     def _go_to(self, duration_s: float) -> None:
         command = self._command

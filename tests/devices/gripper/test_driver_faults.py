@@ -32,10 +32,12 @@ from station.devices.gripper.urcap import UrcapLink
 from station.messages import gripper as messages
 from station.messages.message import Message
 from station.settings.gripper import GripperSettings, ModbusRtuSettings, UrcapSettings
+from station.twin.robotiq.load import NoLoad, Spring
 from station.twin.robotiq.registers import Command
 from station.twin.robotiq.rtu import framed
 
 OnWire = Callable[..., Any]
+DIGIT_MM = 32.0
 
 
 async def under_way(rig: Any) -> asyncio.Task[Any]:
@@ -75,6 +77,29 @@ def test_each_fault_ends_a_move_by_its_name_and_the_fingers_stay(on_wire: OnWire
         assert rig.twin.opening_mm(rig.clock.now_s()) == before_mm
         await rig.activate()
         assert (await rig.driver.open()).reading.object_state == ObjectState.AT_POSITION
+
+    on_wire(scenario)
+
+
+def test_after_a_loss_of_power_the_position_of_before_is_known_and_the_reported_one_is_not_believed(on_wire: OnWire):
+    async def scenario(rig: Any) -> None:
+        rig.load(Spring(free_mm=DIGIT_MM + 44.0, stiffness_n_per_mm=1.5))
+        assert rig.driver.known_width_mm is None, "nothing was read yet"
+        held = await rig.driver.move_to_width(40.0, 150.0, 20.0)
+        rig.faults.set("power_cut")
+        rig.faults.clear()
+        reading = await rig.driver.read()
+        assert not reading.active
+        assert reading.width_mm > rig.driver.max_width_mm
+        assert rig.driver.known_width_mm == held.width_mm
+        rig.load(NoLoad())
+        assert (await rig.driver.activate()).active
+        assert rig.driver.known_width_mm >= rig.driver.max_width_mm
+        moving = await under_way(rig)
+        rig.faults.set("off")
+        with pytest.raises(GripperError):
+            await moving
+        assert rig.driver.known_width_mm is None, "they were sent elsewhere, and no more is known"
 
     on_wire(scenario)
 

@@ -288,7 +288,9 @@ class Registers(RuleBasedStateMachine):
         assert 0.0 <= self.gripper.opening_mm(self.clock.now_s()) <= 85.0
         assert all(0 <= word <= 0xFFFF for word in status.words())
         if not self.faults.active("wrong"):
-            assert 3 <= status.position <= 230
+            assert 3 <= status.position <= 230 or (status.position == 0 and status.state != 3), (
+                "0 is after a loss of power"
+            )
             assert status.echo == self.gripper.command.position
         if status.state == 3 and not status.go_to:
             assert status.current == 0

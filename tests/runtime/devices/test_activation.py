@@ -22,21 +22,24 @@ EMPTY_THE_JAWS = GripperNotActiveError(gripper_messages.JAWS_UNKNOWN(), gripper_
 WAIT = GripperNotActiveError(gripper_messages.NOT_ACTIVE(), gripper_messages.REMEDY_WAIT())
 OVER_TEMPERATURE = 0x8
 AROUND_A_FRUIT_MM = 20.0
+OPEN_MM = 54.0
 
 
 @dataclass
 class Gripper:
-    """A gripper with its fingers around a fruit."""
+    """A gripper with its fingers around a fruit, or as wide as it is set to."""
 
     active: bool = True
     fault_code: int = 0
     activations: int = 0
     max_width_mm: float = 53.0
     fails: Exception | None = None
+    known_width_mm: float | None = None
+    width_mm: float = AROUND_A_FRUIT_MM
 
     async def read(self):
         state, now_s = ObjectState.IDLE, time.monotonic()
-        return GripperReading(AROUND_A_FRUIT_MM, 120, 120, state, self.active, self.fault_code, None, now_s)
+        return GripperReading(self.width_mm, 120, 120, state, self.active, self.fault_code, None, now_s)
 
     async def activate(self):
         self.activations += 1
@@ -128,6 +131,21 @@ def test_a_confirmation_remains_while_the_gripper_waits_for_its_activation(bench
         assert await bench.check() is not None
         assert await bench.activate() is None
         assert bench.gripper.activations == 1
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(
+    ("known_width_mm", "at", "activations"),
+    [(None, "nest", 0), (AROUND_A_FRUIT_MM, "nest", 0), (OPEN_MM, "above_nest", 1)],
+)
+def test_at_the_nest_only_a_width_of_before_the_loss_of_activation_is_believed(bench, known_width_mm, at, activations):
+    async def scenario():
+        bench.gripper.active, bench.gripper.width_mm = False, OPEN_MM
+        bench.gripper.known_width_mm = known_width_mm
+        refused = await bench.activate()
+        assert (refused and str(refused)) == (None if activations else str(EMPTY_THE_JAWS))
+        assert (bench.arm.at, bench.gripper.activations) == (at, activations)
 
     asyncio.run(scenario())
 
