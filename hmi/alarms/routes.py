@@ -109,7 +109,14 @@ async def _done(gateway: Gateway, request: ChannelMessage) -> None:
 def place(alarm: str) -> str:
     """Return the part of the station that an alarm is about, for the drawing of the station."""
     places = {
-        "arm": ("emergency_stop", "protective_stop", "safety_fault", "arm_link_lost", "arm_not_remote"),
+        "arm": (
+            "emergency_stop",
+            "protective_stop",
+            "safety_fault",
+            "arm_link_lost",
+            "arm_not_remote",
+            "arm_not_ready",
+        ),
         "gripper": ("fruit_held", "gripper_link_lost", "gripper_fault", "gripper_jam"),
         "sensor": (
             "camera_lost",

@@ -64,6 +64,7 @@ class AlarmId(StrEnum):
     OUTBOX_BEHIND = "outbox_behind"
     CONNECTION_FLOOD = "connection_flood"
     RECORDS_LOST = "records_lost"
+    ARM_NOT_READY = "arm_not_ready"
 
 
 class AlarmRow(NamedTuple):
@@ -128,6 +129,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     AlarmId.OUTBOX_BEHIND: AlarmRow(33, Priority.LOW, texts.OUTBOX_BEHIND),
     AlarmId.CONNECTION_FLOOD: AlarmRow(34, Priority.LOW, texts.CONNECTION_FLOOD),
     AlarmId.RECORDS_LOST: AlarmRow(35, Priority.HIGH, texts.RECORDS_LOST),
+    AlarmId.ARM_NOT_READY: AlarmRow(36, Priority.MEDIUM, texts.ARM_NOT_READY),
 }
 """Every alarm, in the order of its number."""
 

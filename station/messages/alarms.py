@@ -71,6 +71,19 @@ ARM_NOT_REMOTE = AlarmTexts(
         "alarm.action.arm_not_remote", "Switch the pendant to remote control, then `station devices recover program`."
     ),
 )
+ARM_NOT_READY = AlarmTexts(
+    define(
+        "alarm.cause.arm_not_ready",
+        "The arm answers, but cannot move: a guard is open, it has no power, its program was stopped, or it did not "
+        "reach a pose.",
+    ),
+    _REFUSED,
+    define(
+        "alarm.action.arm_not_ready",
+        "Do what the alarm's detail says: guard closed? Arm switched on? Its way free? Then confirm at the panel if it "
+        "does not continue by itself.",
+    ),
+)
 GRIPPER_LINK_LOST = AlarmTexts(
     define("alarm.cause.gripper_link_lost", "The gripper does not answer."),
     _REFUSED,

@@ -75,4 +75,5 @@ PROVOCATIONS: dict[AlarmId, tuple[Provocation, ...]] = {
     AlarmId.OUTBOX_BEHIND: (Provocation("process", "postgresql_away"),),
     AlarmId.CONNECTION_FLOOD: (Provocation("process", "connections"),),
     AlarmId.RECORDS_LOST: (Provocation("files", "database_damaged"), Provocation("files", "database_removed")),
+    AlarmId.ARM_NOT_READY: (Provocation("arm", "safeguard"), Provocation("arm", "wrong")),
 }

@@ -37,6 +37,7 @@ OF_DEVICE: dict[str, frozenset[AlarmId]] = {
             AlarmId.SAFETY_FAULT,
             AlarmId.ARM_LINK_LOST,
             AlarmId.ARM_NOT_REMOTE,
+            AlarmId.ARM_NOT_READY,
         }
     ),
     GRIPPER: frozenset({AlarmId.EMERGENCY_STOP, AlarmId.GRIPPER_LINK_LOST, AlarmId.GRIPPER_FAULT, AlarmId.GRIPPER_JAM}),
@@ -52,7 +53,12 @@ _ARM = {
     ArmCause.LOCAL_CONTROL: AlarmId.ARM_NOT_REMOTE,
     ArmCause.PROGRAM_STOPPED: AlarmId.ARM_NOT_REMOTE,
     ArmCause.REGISTERS_IN_USE: AlarmId.ARM_NOT_REMOTE,
+    ArmCause.LINK_LOST: AlarmId.ARM_LINK_LOST,
+    ArmCause.STALE: AlarmId.ARM_LINK_LOST,
+    ArmCause.DEADLINE: AlarmId.ARM_LINK_LOST,
+    ArmCause.CLOSED: AlarmId.ARM_LINK_LOST,
 }
+"""All other causes are of an arm that answers."""
 _FRAMES = (
     (frozenset({FrameFault.WRONG_SIZE}), AlarmId.CAMERA_LOST),
     (frozenset({FrameFault.STALE, FrameFault.REPEATED}), AlarmId.CAMERA_STALE),
@@ -67,7 +73,7 @@ def alarm_of(device: str, fault: StationError) -> AlarmId:
         case FramesError():
             return next((alarm for faults, alarm in _FRAMES if fault.faults & faults), AlarmId.CAMERA_STALE)
         case ArmFault():
-            return _ARM.get(fault.cause, AlarmId.ARM_LINK_LOST)
+            return _ARM.get(fault.cause, AlarmId.ARM_NOT_READY)
         case GripperEmergencyStopError():
             return AlarmId.EMERGENCY_STOP
         case GripperTimeoutError():

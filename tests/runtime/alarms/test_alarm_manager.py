@@ -1,8 +1,13 @@
-"""The alarm manager: a cause that stays, and what is found about it."""
+"""The alarm manager: a cause that stays, what is found about it, and the alarm of each fault of the arm."""
 
+import pytest
+
+from station.devices.arm.faults import ArmCause, ArmFault
 from station.inspection.alarm_table import AlarmId
+from station.messages.message import verbatim
 from station.messages.operation import INTERFACE_SILENT
-from station.runtime.alarms.manager import AlarmManager
+from station.runtime.alarms.manager import OF_DEVICE, AlarmManager
+from station.runtime.devices.manager import ARM
 from station.runtime.observability.metrics import Metrics
 
 
@@ -15,3 +20,26 @@ def test_a_later_finding_is_the_alarms_detail_and_no_second_alarm():
     assert alarm.raised == 1
     manager.update(AlarmId.PLC_INTERFACE_LOST, None)
     assert alarm.id not in [each.id for each in manager.alarms.active]
+
+
+OWN_ALARM = {
+    ArmCause.EMERGENCY_STOP: AlarmId.EMERGENCY_STOP,
+    ArmCause.PROTECTIVE_STOP: AlarmId.PROTECTIVE_STOP,
+    ArmCause.SAFETY_FAULT: AlarmId.SAFETY_FAULT,
+    **dict.fromkeys(
+        (ArmCause.LOCAL_CONTROL, ArmCause.PROGRAM_STOPPED, ArmCause.REGISTERS_IN_USE), AlarmId.ARM_NOT_REMOTE
+    ),
+    **dict.fromkeys((ArmCause.LINK_LOST, ArmCause.STALE, ArmCause.DEADLINE, ArmCause.CLOSED), AlarmId.ARM_LINK_LOST),
+}
+
+
+@pytest.mark.parametrize("cause", ArmCause)
+def test_only_an_arm_that_does_not_answer_has_the_alarm_of_its_network_cable(cause):
+    manager = AlarmManager(Metrics("0", 1.0))
+    manager.set_device_fault(ARM, ArmFault(cause, verbatim("the arm's own")))
+    [alarm] = manager.alarms.active
+    assert alarm.id is OWN_ALARM.get(cause, AlarmId.ARM_NOT_READY)
+    assert alarm.id in OF_DEVICE[ARM]
+    manager.set_device_fault(ARM, None)
+    manager.reset()
+    assert not manager.alarms.active

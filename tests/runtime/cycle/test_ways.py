@@ -91,7 +91,7 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
             await cell.until(lambda: restarted)
             [(needed, alarms, ready)] = restarted
             assert needed
-            assert AlarmId.ARM_LINK_LOST in alarms
+            assert AlarmId.ARM_NOT_READY in alarms
             assert not ready
             await line.ready()
 
