@@ -46,6 +46,12 @@ REMEDY_EMERGENCY_STOP = define(
     "make the cell safe, release the button, bring the robot back to running, then activate the gripper",
 )
 
+NO_VALUES = define("gripper.no_values", "the URCap has no values of the gripper")
+REMEDY_NO_VALUES = define(
+    "gripper.remedy_no_values",
+    "check that the arm is switched on, the gripper's cable at the wrist, and the gripper's light",
+)
+
 NOT_ACTIVE = define("gripper.not_active", "it is not activated")
 REMEDY_CLEAR_AND_ACTIVATE = define(
     "gripper.remedy_clear_and_activate", "clear the fingers and activate it: they travel their whole way"

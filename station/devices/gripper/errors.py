@@ -48,6 +48,15 @@ class GripperProtocolError(GripperError):
     code = "protocol"
 
 
+class GripperNoValuesError(GripperError):
+    """The URCap answers, but has no values of the gripper, and the robot is not emergency stopped."""
+
+    code = "no_values"
+
+    def __init__(self) -> None:
+        super().__init__(messages.NO_VALUES(), messages.REMEDY_NO_VALUES())
+
+
 class GripperNotActiveError(GripperError):
     """A motion was requested of a gripper that is not activated."""
 
@@ -112,5 +121,11 @@ class GripperFaultError(GripperError):
         self.code = text.name
 
 
-LINK_ERRORS = (GripperUnreachableError, GripperLinkLostError, GripperSilentError, GripperProtocolError)
+LINK_ERRORS = (
+    GripperUnreachableError,
+    GripperLinkLostError,
+    GripperSilentError,
+    GripperProtocolError,
+    GripperNoValuesError,
+)
 """Errors of the connection, which say nothing of the fingers."""

@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 
 from station.devices.gripper.calibration import (
@@ -23,7 +24,7 @@ from station.devices.gripper.errors import (
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
 from station.devices.gripper.link import Link, State, Status
 from station.devices.gripper.modbus_rtu import ModbusRtuLink
-from station.devices.gripper.urcap import UrcapLink
+from station.devices.gripper.urcap import UrcapLink, emergency_stopped
 from station.messages import gripper as messages
 from station.messages.message import Message
 from station.settings.gripper import GripperSettings
@@ -285,8 +286,8 @@ def _late_at(step: Message, status: Status) -> Message:
     return messages.LATE_AT(step=step, count=status.position, state=_STATE_MESSAGES[state])
 
 
-def make_gripper(settings: GripperSettings) -> Robotiq2F85:
-    """Make the gripper of the settings; nothing is sent yet."""
+def make_gripper(settings: GripperSettings, stopped: Callable[[], Awaitable[bool]] = emergency_stopped) -> Robotiq2F85:
+    """Make the gripper of the settings; nothing is sent yet. Whether its robot is `stopped` see `UrcapLink`."""
     if settings.driver == "urcap":
-        return Robotiq2F85(UrcapLink(settings.urcap, settings.answer_timeout_s), settings)
+        return Robotiq2F85(UrcapLink(settings.urcap, settings.answer_timeout_s, stopped), settings)
     return Robotiq2F85(ModbusRtuLink(settings.modbus_rtu, settings.answer_timeout_s), settings)

@@ -5,12 +5,14 @@ The socket carries no motor current. Unverified on hardware.
 
 import asyncio
 import os
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from typing import NoReturn
 
 from station.devices.gripper.errors import (
     GripperEmergencyStopError,
     GripperLinkLostError,
+    GripperNoValuesError,
     GripperProtocolError,
     GripperSilentError,
     GripperUnreachableError,
@@ -27,11 +29,27 @@ _CONNECT_TIMEOUT_S = 2.0
 """Includes time for one lost packet, which TCP repeats after a second."""
 
 
-class UrcapLink:
-    """One persistent connection to the URCap."""
+async def emergency_stopped() -> bool:
+    """Return True: without an arm that reports its stops, a gripper without values is taken for emergency stopped."""
+    return True
 
-    def __init__(self, settings: UrcapSettings, answer_timeout_s: float) -> None:
+
+class UrcapLink:
+    """One persistent connection to the URCap.
+
+    Args:
+        stopped: whether the robot is emergency stopped. The URCap answers `?` then, but also while the gripper's cable
+            is broken or the arm is off.
+    """
+
+    def __init__(
+        self,
+        settings: UrcapSettings,
+        answer_timeout_s: float,
+        stopped: Callable[[], Awaitable[bool]] = emergency_stopped,
+    ) -> None:
         self._settings = settings
+        self._stopped = stopped
         self._answer_timeout_s = answer_timeout_s
         self._exchange = asyncio.Lock()
         self._streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
@@ -90,7 +108,7 @@ class UrcapLink:
         answer = await self._ask(f"GET {name}\n".encode())
         words = answer.decode("ascii", errors="replace").split()
         if words == [name, "?"]:
-            raise GripperEmergencyStopError
+            raise GripperEmergencyStopError if await self._stopped() else GripperNoValuesError
         if len(words) != 2 or words[0] != name or not words[1].isdecimal() or int(words[1]) > largest:
             await self._refuse(f"GET {name}", answer)
         return int(words[1])

@@ -41,6 +41,8 @@ _ARM_PAUSE_S = 0.5
 """The driver reconnects to the arm by itself; only its state is read."""
 _OVER_TEMPERATURE = 0x8
 _OLD_WIDTH_S = 1.0
+_STOP_SHOWN_S, _STOP_POLL_S = 0.3, 0.1
+"""So long after the gripper has lost its power the arm's state may show the emergency stop that took it."""
 
 
 class DeviceManager:
@@ -59,7 +61,9 @@ class DeviceManager:
     ) -> None:
         arm = None if configuration.service.bench else UrArm(configuration.arm)
         self._arm, self._configuration = arm, configuration
-        self.cell = Cell(camera_from(configuration.camera), make_gripper(configuration.gripper), arm)
+        self.cell = Cell(
+            camera_from(configuration.camera), make_gripper(configuration.gripper, self._emergency_stopped), arm
+        )
         self.calibration = ActiveCalibration(configuration, lambda: self.cell.camera.description.serial)
         """Of the camera in use."""
         self.simulated = (
@@ -260,6 +264,18 @@ class DeviceManager:
             await self._arm.move_to("above_nest")
         elif state.at not in {"home", "above_nest"}:
             raise refusal
+
+    async def _emergency_stopped(self) -> bool:
+        """Check whether the arm reports an emergency stop; the URCap's answer is the same with a broken cable."""
+        until_s = time.monotonic() + _STOP_SHOWN_S
+        while self._arm is not None:
+            fault = (await self._arm.state()).fault
+            if fault is not None and fault.cause is ArmCause.EMERGENCY_STOP:
+                break
+            if time.monotonic() > until_s:
+                return False
+            await asyncio.sleep(_STOP_POLL_S)
+        return True
 
     async def _check_camera(self) -> None:
         await self.cell.camera.open()

@@ -58,7 +58,8 @@ class GripperFault(StrEnum):
     POWER_CUT = "power_cut"
     """Switching it on is the event: without power for a moment, then without activation and at position 0 until it."""
     EMERGENCY_STOPPED = "emergency_stopped"
-    """The URCap answers `?` and the fingers stop for good; over Modbus the registers can still be read."""
+    """As in an emergency stop, or with a broken cable at the wrist: the URCap answers `?` and the fingers stop for
+    good; over Modbus the registers can still be read."""
 
 
 MAJOR = {
