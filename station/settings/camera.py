@@ -76,7 +76,8 @@ class CameraSettings(Settings):
     open_deadline_s: float = setting(
         5.0,
         title="Opening deadline",
-        description="Longest wait for the first frame after opening.",
+        description="Longest wait for the first frame after opening. The station waits at most half of "
+        "`service.progress_s` at once, and tries again.",
         unit="s",
         gt=0.0,
         le=60.0,

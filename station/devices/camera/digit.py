@@ -158,7 +158,7 @@ class DigitCamera:
         return CameraDescription(name, _MODE[1], _MODE[0], scale, _MODE[2], self._serial, self._revision, self._notice)
 
     async def open(self) -> None:
-        """Find the sensor and wait for its first frame. Idempotent.
+        """Find the sensor and wait for its first frame. Idempotent: after an error the search goes on until `close`.
 
         Raises:
             NoCameraError: no such sensor is plugged in, or it gives no frame within the settings' deadline.
@@ -172,7 +172,6 @@ class DigitCamera:
         try:
             await self._feed.newer(-math.inf, self._settings.open_deadline_s)
         except NoFrameError as error:
-            await self.close()
             limit_s, reason = self._settings.open_deadline_s, self._feed.trouble or messages.NOTHING_SENT()
             raise NoCameraError(messages.NO_FIRST_FRAME(camera=self._name, limit_s=limit_s, reason=reason)) from error
 

@@ -35,6 +35,7 @@ TITLES = {CAMERA: device_messages.CAMERA(), GRIPPER: device_messages.GRIPPER(), 
 SAFETY_STOPS = {ArmCause.PROTECTIVE_STOP, ArmCause.EMERGENCY_STOP, ArmCause.SAFETY_FAULT}
 """Stops by the arm's safety controller that a person has to check at the cell."""
 _BAD_FRAMES = 3
+_OPENING_SHARE = 0.5
 _STALE_CHECKS = 3
 """Failed checks in a row that make a fault: one may be a moment's delay of this machine."""
 _ARM_PAUSE_S = 0.5
@@ -61,9 +62,10 @@ class DeviceManager:
     ) -> None:
         arm = None if configuration.service.bench else UrArm(configuration.arm)
         self._arm, self._configuration = arm, configuration
-        self.cell = Cell(
-            camera_from(configuration.camera), make_gripper(configuration.gripper, self._emergency_stopped), arm
-        )
+        # A camera that is waited for is progress only from check to check.
+        opening_s = min(configuration.camera.open_deadline_s, _OPENING_SHARE * configuration.service.progress_s)
+        camera = camera_from(configuration.camera.model_copy(update={"open_deadline_s": opening_s}))
+        self.cell = Cell(camera, make_gripper(configuration.gripper, self._emergency_stopped), arm)
         self.calibration = ActiveCalibration(configuration, lambda: self.cell.camera.description.serial)
         """Of the camera in use."""
         self.simulated = (

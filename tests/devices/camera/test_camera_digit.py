@@ -1,4 +1,5 @@
 import asyncio
+import threading
 import time
 
 import cv2
@@ -190,6 +191,38 @@ def test_an_exception_of_opencvs_costs_one_opening_and_not_the_thread(tmp_path):
     assert all(capture.released for capture in opened)
 
 
+class HungCapture(FakeCapture):
+    """One whose reading hangs until the test ends it, as OpenCV's wait for a frame does for 10 s."""
+
+    def __init__(self):
+        super().__init__()
+        self.let_go, self.returned = threading.Event(), False
+
+    def read(self):
+        self.let_go.wait(8.0)
+        self.returned = True
+        return super().read()
+
+
+def test_a_sensor_that_hangs_is_an_error_before_its_reading_returns_and_is_used_once_it_sends(tmp_path):
+    listing = plug(tmp_path, "video4", "2833:0209", "D20966")
+    capture = HungCapture()
+
+    async def play():
+        camera = DigitCamera(CameraSettings(driver="digit", open_deadline_s=0.05), listing, lambda _: capture)
+        for _ in range(2):
+            with pytest.raises(NoCameraError):
+                await camera.open()
+        assert not capture.returned
+        capture.let_go.set()
+        assert (await camera.frame(0.0, 20.0)).image.shape == (640, 480, 3)
+        await camera.open()
+        await camera.close()
+
+    asyncio.run(play())
+    assert capture.released
+
+
 def test_no_such_sensor_is_said_with_those_that_are_there(tmp_path):
     listing = plug(tmp_path, "video4", "2833:0209", "D20003")
 
@@ -197,6 +230,7 @@ def test_no_such_sensor_is_said_with_those_that_are_there(tmp_path):
         camera = DigitCamera(CameraSettings(driver="digit", open_deadline_s=0.2), listing)
         with pytest.raises(NoCameraError) as caught:
             await camera.open()
+        await camera.close()
         reason = caught.value.message.parameters["reason"]
         assert reason == messages.NOT_PLUGGED_IN(serial="D20966", found="D20003")
 

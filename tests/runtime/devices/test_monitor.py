@@ -1,10 +1,17 @@
 """What a device's monitor reports: each change that means something else to the cycle, once."""
 
+import pytest
+
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.gripper.errors import GripperNotActiveError
 from station.messages import device as messages
 from station.messages.message import verbatim
+from station.runtime.devices import manager
+from station.runtime.devices.manager import DeviceManager
 from station.runtime.devices.monitor import DeviceMonitor
+from station.runtime.devices.rig import FRAME_DEADLINE_S
+from station.settings.camera import CameraSettings
+from station.settings.configuration import Configuration
 
 
 async def healthy() -> None:
@@ -22,3 +29,16 @@ def test_another_cause_is_reported_and_another_wording_of_the_same_is_not():
     for fault in (stale, older, stopped, stopped, inactive, stale):
         monitor.report_fault(fault)
     assert reported == [stale, stopped, inactive, stale]
+
+
+@pytest.mark.parametrize("deadline_s", [0.2, CameraSettings().open_deadline_s, 60.0])
+def test_a_check_of_a_camera_that_does_not_open_ends_before_the_station_counts_as_stuck(
+    tmp_path, monkeypatch, deadline_s
+):
+    used, camera_from = [], manager.camera_from
+    monkeypatch.setattr(manager, "camera_from", lambda settings: (used.append(settings), camera_from(settings))[1])
+    configuration = Configuration(home=tmp_path, camera=CameraSettings(open_deadline_s=deadline_s))
+    DeviceManager(configuration, lambda *_: None, lambda _: None)
+    [settings] = used
+    assert settings.open_deadline_s + FRAME_DEADLINE_S < configuration.service.progress_s
+    assert settings.open_deadline_s <= deadline_s
