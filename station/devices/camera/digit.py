@@ -108,7 +108,6 @@ def set_mode(capture: Capture, serial: str) -> None:
     capture.set(cv2.CAP_PROP_FRAME_WIDTH, width)
     capture.set(cv2.CAP_PROP_FRAME_HEIGHT, height)
     capture.set(cv2.CAP_PROP_FPS, frames_per_s)
-    capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
     properties = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT, cv2.CAP_PROP_FPS)
     given = tuple(capture.get(one) for one in properties)
     if given != _MODE:
@@ -131,7 +130,10 @@ def open_v4l2(node: str) -> Capture:
 
 
 class DigitCamera:
-    """Driver `digit`: a thread reads frame after frame, so that the kernel's buffer never has an old one.
+    """Driver `digit`: a thread reads frame after frame, so that the kernel's buffers never have an old one.
+
+    Of these there is more than one: with a single one the sensor has none to fill while a frame is read, and loses the
+    next. Unverified on hardware.
 
     A lost sensor is searched by its serial number until the camera is closed.
     """

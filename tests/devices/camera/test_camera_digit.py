@@ -85,7 +85,7 @@ class FakeCapture:
         self.released = True
 
 
-def test_the_mode_is_asked_for_in_full_with_no_queue_of_old_frames():
+def test_the_mode_is_asked_for_in_full_and_the_kernels_buffers_stay_as_they_are():
     capture = FakeCapture()
     set_mode(capture, "D20966")
     assert capture.properties == {
@@ -93,7 +93,6 @@ def test_the_mode_is_asked_for_in_full_with_no_queue_of_old_frames():
         cv2.CAP_PROP_FRAME_WIDTH: 640,
         cv2.CAP_PROP_FRAME_HEIGHT: 480,
         cv2.CAP_PROP_FPS: 30,
-        cv2.CAP_PROP_BUFFERSIZE: 1,
     }
 
 
