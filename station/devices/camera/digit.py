@@ -37,6 +37,8 @@ _MODE = (640, 480, 30.0)
 _LIGHT_SINCE = "0200"
 """`bcdDevice` of firmware 2.00, from which on each colour's light can be set."""
 _RETRY_S = 0.5
+_OLDEST_STAMP_S = 10.0
+"""A kernel's time of more than this ago is of another clock. Queued frames may be old, and must not pass for new."""
 _STOP_DEADLINE_S = 12.0
 """Longer than the 10 s for which OpenCV's V4L2 select may wait."""
 
@@ -127,6 +129,18 @@ def set_mode(capture: Capture, serial: str) -> None:
 def open_v4l2(node: str) -> Capture:
     """Open a node with OpenCV."""
     return cv2.VideoCapture(node, cv2.CAP_V4L2)  # pyrefly: ignore[bad-return] (OpenCV's stub has MatLike)
+
+
+def captured_at_s(capture: Capture, now_s: float) -> float:
+    """Return the monotonic time of the frame that was just read.
+
+    OpenCV's V4L2 capture gives the kernel's time of the buffer as the position in ms: for uvcvideo on the monotonic
+    clock, when the frame began to come in; a frame of VGA is read some 30 to 60 ms later. Its exposure may have begun
+    up to a frame's period before. Where the time is of another clock, the time of reading is taken. Unverified on
+    hardware.
+    """
+    stamp_s = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000
+    return stamp_s if 0.0 <= now_s - stamp_s <= _OLDEST_STAMP_S else now_s
 
 
 class DigitCamera:
@@ -238,7 +252,7 @@ class DigitCamera:
                     self._leds_wanted.clear()
                     self._set_light(capture)
                 read, image = capture.read()
-                captured_s = time.monotonic()
+                captured_s = captured_at_s(capture, time.monotonic())
                 if not read or image is None:
                     raise NoCameraError(messages.NO_MORE_FRAMES(node=node))
                 with contextlib.suppress(RuntimeError):  # the loop may have closed meanwhile

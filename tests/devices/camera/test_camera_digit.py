@@ -6,8 +6,16 @@ import cv2
 import numpy as np
 import pytest
 
-from station.devices.camera.digit import DigitCamera, DigitDevice, find_digits, packed_leds, set_mode, to_portrait
-from station.devices.camera.interface import CameraError, Leds, NoCameraError
+from station.devices.camera.digit import (
+    DigitCamera,
+    DigitDevice,
+    captured_at_s,
+    find_digits,
+    packed_leds,
+    set_mode,
+    to_portrait,
+)
+from station.devices.camera.interface import CameraError, FrameFault, Leds, NoCameraError
 from station.devices.camera.probe import probe_camera
 from station.messages import camera as messages
 from station.settings.camera import CameraSettings, DigitSettings
@@ -64,6 +72,7 @@ class FakeCapture:
 
     def __init__(self, frames=10**9, width=640.0):
         self.left, self.properties, self.width, self.released = frames, {}, width, False
+        self.stamp_s = 0.0
 
     def isOpened(self):  # noqa: N802
         return True
@@ -73,7 +82,8 @@ class FakeCapture:
         return True
 
     def get(self, prop):
-        return self.width if prop == cv2.CAP_PROP_FRAME_WIDTH else self.properties[prop]
+        read_only = {cv2.CAP_PROP_FRAME_WIDTH: self.width, cv2.CAP_PROP_POS_MSEC: 1000 * self.stamp_s}
+        return read_only[prop] if prop in read_only else self.properties[prop]
 
     def read(self):
         time.sleep(0.005)
@@ -188,6 +198,42 @@ def test_an_exception_of_opencvs_costs_one_opening_and_not_the_thread(tmp_path):
 
     asyncio.run(play())
     assert all(capture.released for capture in opened)
+
+
+class StampedCapture(FakeCapture):
+    """One whose frames began to come in half a second ago, as after a stall of the reading thread."""
+
+    def read(self):
+        self.stamp_s = time.monotonic() - 0.5
+        return super().read()
+
+
+def test_a_frame_has_the_time_at_which_it_came_in_and_a_queued_one_does_not_pass_for_new(tmp_path):
+    listing = plug(tmp_path, "video4", "2833:0209", "D20966")
+
+    async def play():
+        settings = CameraSettings(driver="digit", open_deadline_s=20.0)
+        camera = DigitCamera(settings, listing, lambda _: StampedCapture())
+        await camera.open()
+        asked_s = time.monotonic()
+        frame = await camera.frame(asked_s, 20.0)
+        read_s = time.monotonic()
+        await camera.close()
+        return asked_s, frame, read_s
+
+    asked_s, frame, read_s = asyncio.run(play())
+    assert asked_s < frame.captured_s <= read_s - 0.5, "captured after it was asked for, long before it was read"
+    assert FrameFault.STALE in frame.faults
+
+
+@pytest.mark.parametrize(
+    ("stamp_s", "captured_s"),
+    [(999.95, 999.95), (1000.0, 1000.0), (995.0, 995.0), (1000.1, 1000.0), (0.0, 1000.0), (1.7e9, 1000.0)],
+)
+def test_the_kernels_time_is_taken_unless_it_is_of_another_clock(stamp_s, captured_s):
+    capture = FakeCapture()
+    capture.stamp_s = stamp_s
+    assert captured_at_s(capture, 1000.0) == pytest.approx(captured_s)
 
 
 class HungCapture(FakeCapture):
