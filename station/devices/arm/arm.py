@@ -15,8 +15,6 @@ class ArmState:
     """Age of the controller's state; None if there is none yet."""
     joints_rad: tuple[float, ...] | None
     """Six joint positions; None if the state is stale."""
-    tool_position_mm: tuple[float, float, float] | None
-    """The tool centre point in the base's frame; None if the state is stale."""
     moving: bool | None
     """Whether the arm moves; None if the state is stale."""
     at: PoseName | None

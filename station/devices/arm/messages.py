@@ -103,8 +103,6 @@ class Snapshot(ChannelMessage):
     age_s: float
     joints_rad: Six
     speeds_rad_s: Six
-    tool_pose: Six
-    """x, y, z in m and the rotation vector in rad."""
     robot_mode: int
     safety_bits: int
     runtime_state: int

@@ -38,15 +38,7 @@ from station.errors import StationError
 from station.messages import arm as messages
 from station.messages.message import message_of
 
-VARIABLES = [
-    "timestamp",
-    "actual_q",
-    "actual_qd",
-    "actual_TCP_pose",
-    "robot_mode",
-    "safety_status_bits",
-    "runtime_state",
-]
+VARIABLES = ["timestamp", "actual_q", "actual_qd", "robot_mode", "safety_status_bits", "runtime_state"]
 UPLOAD_S = 2.0
 POLL_S = 0.01
 KICKS_PER_LIMIT = 4
@@ -110,7 +102,6 @@ class UrRtdeProcess:
             age_s=age_s,
             joints_rad=tuple(receive.getActualQ()),
             speeds_rad_s=tuple(receive.getActualQd()),
-            tool_pose=tuple(receive.getActualTCPPose()),
             robot_mode=receive.getRobotMode(),
             safety_bits=receive.getSafetyStatusBits(),
             runtime_state=receive.getRuntimeState(),

@@ -89,14 +89,13 @@ class UrArm:
         try:
             snapshot = await self._link.snapshot()
         except ArmFault as fault:
-            return ArmState(None, None, None, None, None, self._link.fault or fault)
+            return ArmState(None, None, None, None, self._link.fault or fault)
         if snapshot.age_s > self._settings.stale_after_s:
             stale = ArmFault(ArmCause.STALE, messages.STATE_OLD(age_s=snapshot.age_s))
-            return ArmState(snapshot.age_s, None, None, None, None, self._link.fault or stale)
+            return ArmState(snapshot.age_s, None, None, None, self._link.fault or stale)
         moving = _moves(snapshot)
-        x, y, z = (1000 * value for value in snapshot.tool_pose[:3])
         at = None if moving else self._place(snapshot.joints_rad)
-        return ArmState(snapshot.age_s, snapshot.joints_rad, (x, y, z), moving, at, self._link.fault)
+        return ArmState(snapshot.age_s, snapshot.joints_rad, moving, at, self._link.fault)
 
     async def move_to(self, pose: PoseName) -> None:
         """Move to a pose and return when it is reached; at once where the arm is there already.

@@ -17,7 +17,6 @@ def snapshot(safety_bits=1, robot_mode=7, runtime_state=1) -> Snapshot:
         age_s=0.0,
         joints_rad=SIX,
         speeds_rad_s=SIX,
-        tool_pose=SIX,
         robot_mode=robot_mode,
         safety_bits=safety_bits,
         runtime_state=runtime_state,

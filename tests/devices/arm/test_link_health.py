@@ -27,7 +27,6 @@ class Process:
             age_s=0.0,
             joints_rad=SIX,
             speeds_rad_s=SIX,
-            tool_pose=SIX,
             robot_mode=7,
             safety_bits=self.safety_bits,
             runtime_state=self.state,

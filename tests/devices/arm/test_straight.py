@@ -42,7 +42,6 @@ class Link:
             age_s=0.0,
             joints_rad=self.joints_rad,
             speeds_rad_s=SIX,
-            tool_pose=SIX,
             robot_mode=RUNNING,
             safety_bits=1,
             runtime_state=PLAYING,

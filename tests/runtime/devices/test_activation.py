@@ -54,7 +54,7 @@ class Arm:
     fault: ArmFault | None = None
 
     async def state(self):
-        return ArmState(0.01, (0.0,) * 6, (0.0, 0.0, 0.0), moving=False, at=self.at, fault=self.fault)
+        return ArmState(0.01, (0.0,) * 6, moving=False, at=self.at, fault=self.fault)
 
     async def move_to(self, pose):
         self.at = pose

@@ -33,7 +33,7 @@ class Arm:
         self.readings += 1
         cause = self.cause if self.readings > 1 else None
         fault = None if cause is None else ArmFault(cause, verbatim("the arm's own"))
-        return ArmState(0.01, (0.0,) * 6, (0.0, 0.0, 0.0), moving=False, at="home", fault=fault)
+        return ArmState(0.01, (0.0,) * 6, moving=False, at="home", fault=fault)
 
 
 @pytest.mark.parametrize(
