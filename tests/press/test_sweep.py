@@ -47,7 +47,7 @@ class Fingers:
         width_mm = self.width_at(self.now_s)
         held = self.stopped_at_mm > self._to_mm and width_mm <= self.stopped_at_mm
         state = ObjectState.CONTACT_CLOSING if held else ObjectState.AT_POSITION
-        return GripperReading(width_mm, 0, 0, state, active=True, fault_code=0, current_a=None, at_s=asked_s)
+        return GripperReading(width_mm, 0, state, active=True, fault_code=0, current_a=None, at_s=asked_s)
 
     async def move_to_width(self, width_mm: float, speed_mm_s: float, _force_n: float) -> MoveResult:
         self._stopped.clear()

@@ -27,8 +27,6 @@ class GripperReading:
     width_mm: float
     """Measured gap for the fruit; negative if the fingers press on each other."""
     position_count: int
-    echoed_count: int
-    """The gripper's present position request."""
     object_state: ObjectState
     active: bool
     """Activated and ready to move."""

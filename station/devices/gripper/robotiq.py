@@ -272,7 +272,6 @@ class Robotiq2F85:
         return GripperReading(
             width_mm=width_of_count(status.position, self._calibration),
             position_count=status.position,
-            echoed_count=status.echo,
             object_state=state,
             active=status.state == State.ACTIVE,
             fault_code=status.fault,

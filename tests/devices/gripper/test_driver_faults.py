@@ -223,7 +223,7 @@ def test_a_late_answer_is_silence_and_never_taken_for_the_next(on_wire: OnWire):
             await rig.driver.read()
         rig.faults.clear()
         rig.twin.write(Command(activate=True, go_to=True, position=99))
-        assert (await rig.driver.read()).echoed_count == 99
+        assert (await rig.driver.link.status()).echo == 99
 
     on_wire(scenario)
 
@@ -239,7 +239,7 @@ def test_an_answer_to_a_cancelled_question_is_not_taken_for_the_next(on_wire: On
             await reading
         rig.twin.write(Command(activate=True, go_to=True, position=99))
         for _ in range(3):
-            assert (await rig.driver.read()).echoed_count == 99
+            assert (await rig.driver.link.status()).echo == 99
 
     on_wire(scenario)
 

@@ -31,7 +31,7 @@ class Jaws:
         self._moves, self._state = moves, state
 
     async def read(self) -> GripperReading:
-        return GripperReading(self.width_mm, 0, 0, self._state, True, 0, None, 0.0)
+        return GripperReading(self.width_mm, 0, self._state, True, 0, None, 0.0)
 
     async def open(self, width_mm: float | None = None) -> MoveResult:
         to_mm = self.max_width_mm if width_mm is None else width_mm

@@ -39,7 +39,7 @@ class Gripper:
 
     async def read(self):
         state, now_s = ObjectState.IDLE, time.monotonic()
-        return GripperReading(self.width_mm, 120, 120, state, self.active, self.fault_code, None, now_s)
+        return GripperReading(self.width_mm, 120, state, self.active, self.fault_code, None, now_s)
 
     async def activate(self):
         self.activations += 1
