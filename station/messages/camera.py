@@ -105,10 +105,6 @@ REPLAY_UNREADABLE = define(
 REPLAY_MISSING = define(
     "camera.replay_missing", "replay: there is no folder or video {source}; correct camera.replay.source"
 )
-REPLAY_WIDTHS = define(
-    "camera.replay_widths", "replay: {file}: expected CSV with the columns image, width_mm: {reason}"
-)
-REPLAY_WIDTH = define("camera.replay_width", "replay: {file}: a width is not a finite number of millimetres")
 REPLAY_ENDED = define("camera.replay_ended", "the recording has ended")
 REMEDY_REPLAY = define(
     "camera.remedy_replay",

@@ -35,11 +35,6 @@ class ReplaySettings(Settings):
         description="A folder of images in natural order, or a video file.",
         min_length=1,
     )
-    widths: str | None = setting(
-        None,
-        title="Widths",
-        description="CSV file `image,width_mm` with the gripper's width at each frame; none where left out.",
-    )
     frames_per_s: float | None = setting(
         30.0,
         title="Rate",

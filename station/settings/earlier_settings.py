@@ -11,7 +11,7 @@ class Move(NamedTuple):
 
 
 MOVES = (Move(("service", "channel"), ("handshake", "endpoint")),)
-WITHOUT_EFFECT = (("arm", "restart_budget"), ("arm", "restart_window_s"))
+WITHOUT_EFFECT = (("arm", "restart_budget"), ("arm", "restart_window_s"), ("camera", "replay", "widths"))
 """Settings that are gone: nothing takes their place."""
 EARLIER = frozenset((*(move.old for move in MOVES), *WITHOUT_EFFECT))
 """The places of all of them."""

@@ -18,25 +18,21 @@ class FrameFeed:
         self._image: Image | None = None
         self._before: Image | None = None
         self._captured_s = 0.0
-        self._width_mm: float | None = None
         self._sequence = 0
         self._given: Frame | None = None
         self.trouble: Message | None = messages.NOTHING_SENT()
         """The driver's faults since the last frame; part of the message if no frame comes."""
 
-    def publish(
-        self, image: Image, captured_s: float, width_mm: float | None = None, sequence: int | None = None
-    ) -> None:
+    def publish(self, image: Image, captured_s: float, sequence: int | None = None) -> None:
         """Set a new frame; only from the event loop's thread.
 
         Args:
             image: shape (height, width, 3), dtype uint8; not changed from now on.
             captured_s: monotonic time of its capture.
-            width_mm: the gripper's width recorded with it.
             sequence: the device's own number of the frame; counted here if the device has none.
         """
         self._before, self._image = self._image, image
-        self._captured_s, self._width_mm = captured_s, width_mm
+        self._captured_s = captured_s
         self._sequence = self._sequence + 1 if sequence is None else sequence
         self.trouble = None
         self._changed.set()
@@ -67,4 +63,4 @@ class FrameFeed:
 
     def _judged(self, image: Image) -> Frame:
         faults: frozenset[FrameFault] = self._health.judge(image, self._before, time.monotonic() - self._captured_s)
-        return Frame(image, self._sequence, self._captured_s, faults, self._width_mm)
+        return Frame(image, self._sequence, self._captured_s, faults)

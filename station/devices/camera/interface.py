@@ -93,8 +93,6 @@ class Frame:
     captured_s: float
     """Monotonic time (`time.monotonic`) at which it was captured."""
     faults: frozenset[FrameFault] = frozenset()
-    width_mm: float | None = None
-    """The gripper's width that was recorded with it; only in a replay."""
 
 
 @dataclass(frozen=True, slots=True)

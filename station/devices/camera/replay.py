@@ -1,7 +1,6 @@
 """Replay camera: a recording, a folder of images or a video, in real time or as fast as requested."""
 
 import asyncio
-import csv
 import math
 import time
 from collections.abc import Iterator
@@ -27,8 +26,7 @@ class ReplayCamera:
     def __init__(self, settings: CameraSettings) -> None:
         self._settings = settings
         self._source = Path(settings.replay.source)
-        self._frames: Iterator[tuple[str, Image]] | None = None
-        self._widths: dict[str, float] = {}
+        self._frames: Iterator[Image] | None = None
         self._feed: FrameFeed | None = None
         self._playing: asyncio.Task[None] | None = None
         self._size = (0, 0)
@@ -46,20 +44,17 @@ class ReplayCamera:
 
         Raises:
             NoCameraError: the recording is missing, empty or no recording.
-            CameraError: the file of widths is invalid.
         """
         if self._feed:
             return
-        if self._settings.replay.widths:
-            self._widths = read_widths(Path(self._settings.replay.widths))
         self._frames = read_frames(self._source)
         first = await asyncio.to_thread(next, self._frames, None)
         if first is None:
             raise NoCameraError(messages.REPLAY_EMPTY(source=str(self._source)))
-        self._size = (first[1].shape[0], first[1].shape[1])
+        self._size = (first.shape[0], first.shape[1])
         health = FrameHealth(self._settings.oldest_s, self._size)
         self._feed = FrameFeed(messages.REPLAY(source=str(self._source)), health, messages.REMEDY_REPLAY())
-        self._publish(*first)
+        self._publish(first)
         if self._settings.replay.frames_per_s:
             self._playing = asyncio.create_task(self._play(1.0 / self._settings.replay.frames_per_s), name="replay")
 
@@ -105,16 +100,16 @@ class ReplayCamera:
             self._feed.trouble = _ENDED
             return False
         await asyncio.sleep(max(0.0, began_s + wait_s - time.monotonic()))
-        self._publish(*following)
+        self._publish(following)
         return True
 
-    def _publish(self, name: str, image: Image) -> None:
+    def _publish(self, image: Image) -> None:
         if self._feed:
-            self._feed.publish(image, time.monotonic(), self._widths.get(name))
+            self._feed.publish(image, time.monotonic())
 
 
-def read_frames(source: Path) -> Iterator[tuple[str, Image]]:
-    """Yield the frames of a folder, in natural order, or of a video, by number, with their names, read one by one.
+def read_frames(source: Path) -> Iterator[Image]:
+    """Yield the frames of a folder, in natural order, or of a video, read one by one.
 
     Raises:
         NoCameraError: there is no such recording, or an image in it cannot be read.
@@ -124,34 +119,16 @@ def read_frames(source: Path) -> Iterator[tuple[str, Image]]:
             image = cv2.imread(str(path), cv2.IMREAD_COLOR)
             if image is None:
                 raise NoCameraError(messages.REPLAY_UNREADABLE(file=str(path)))
-            yield path.name, np.asarray(image, np.uint8)
+            yield np.asarray(image, np.uint8)
         return
     if not source.is_file():
         raise NoCameraError(messages.REPLAY_MISSING(source=str(source)))
     video = cv2.VideoCapture(str(source))
     try:
-        number = 0
         while True:
             read, image = video.read()
             if not read:
                 return
-            yield str(number), np.asarray(image, np.uint8)
-            number += 1
+            yield np.asarray(image, np.uint8)
     finally:
         video.release()
-
-
-def read_widths(path: Path) -> dict[str, float]:
-    """Read the gripper's width at each image from a CSV with the columns `image` and `width_mm`.
-
-    Raises:
-        CameraError: the file cannot be read or is no such table.
-    """
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            widths = {row["image"]: float(row["width_mm"]) for row in csv.DictReader(file)}
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        raise CameraError(messages.REPLAY_WIDTHS(file=str(path), reason=repr(error))) from error
-    if not all(math.isfinite(width) for width in widths.values()):
-        raise CameraError(messages.REPLAY_WIDTH(file=str(path)))
-    return widths

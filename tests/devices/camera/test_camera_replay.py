@@ -8,7 +8,7 @@ import pytest
 from station.devices.camera.interface import CameraError, NoCameraError, NoFrameError
 from station.devices.camera.open import camera_from
 from station.devices.camera.probe import probe_camera
-from station.devices.camera.replay import ReplayCamera, read_widths
+from station.devices.camera.replay import ReplayCamera
 from station.messages import camera as messages
 from station.settings.camera import CameraSettings, ReplaySettings
 
@@ -19,32 +19,26 @@ def settings(source, **more):
 
 @pytest.fixture
 def recording(tmp_path):
-    """A folder of twelve images, each of one grey level, and their widths."""
-    rows = ["image,width_mm"]
+    """A folder of twelve images, each of one grey level."""
     for number in range(12):
         noise = np.random.default_rng(number).integers(0, 9, (64, 48, 3))
         cv2.imwrite(str(tmp_path / f"frame_{number}.png"), (noise + 20 * number + 20).clip(0, 240).astype(np.uint8))
-        rows.append(f"frame_{number}.png,{40 - number}")
-    widths = tmp_path / "widths.csv"
-    widths.write_text("\n".join(rows), encoding="utf-8")
-    return tmp_path, widths
+    return tmp_path
 
 
 def levels(frames):
     return [round((float(frame.image.mean()) - 24) / 20) for frame in frames]
 
 
-def test_as_fast_as_asked_each_image_comes_once_in_natural_order_with_its_width(recording):
-    folder, widths = recording
+def test_as_fast_as_asked_each_image_comes_once_in_natural_order(recording):
 
     async def play():
-        camera = camera_from(settings(folder, widths=str(widths), frames_per_s=None))
+        camera = camera_from(settings(recording, frames_per_s=None))
         assert isinstance(camera, ReplayCamera)
         for _ in range(2):
             await camera.open()
             frames = [await camera.frame(time.monotonic(), 1.0) for _ in range(12)]
             assert levels(frames)[:11] == list(range(11))
-            assert [frame.width_mm for frame in frames] == [40 - number for number in range(12)]
             assert camera.description.height_px == 64
             with pytest.raises(NoFrameError) as caught:
                 await camera.frame(time.monotonic(), 1.0)
@@ -58,10 +52,9 @@ def test_as_fast_as_asked_each_image_comes_once_in_natural_order_with_its_width(
 
 
 def test_in_real_time_the_rate_is_kept_and_frames_pass_unseen(recording):
-    folder, _ = recording
 
     async def play():
-        camera = ReplayCamera(settings(folder, frames_per_s=20.0))
+        camera = ReplayCamera(settings(recording, frames_per_s=20.0))
         await camera.open()
         began_s = time.monotonic()
         seen = [await camera.frame(began_s, 2.0)]
@@ -122,20 +115,10 @@ def test_what_is_no_recording_is_refused(tmp_path, content, message):
     asyncio.run(play())
 
 
-@pytest.mark.parametrize("text", ["image\na.png\n", "image,width_mm\na.png,wide\n", "image,width_mm\na.png,nan\n"])
-def test_bad_widths_are_refused(tmp_path, text):
-    path = tmp_path / "widths.csv"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(CameraError) as caught:
-        read_widths(path)
-    assert caught.value.message.parameters["file"] == str(path)
-
-
 @pytest.mark.parametrize("left", [12, 1])
 def test_a_short_recording_is_no_faulty_camera(recording, left):
-    folder, _ = recording
-    for path in sorted(folder.glob("*.png"))[left:]:
+    for path in sorted(recording.glob("*.png"))[left:]:
         path.unlink()
-    [finding] = asyncio.run(probe_camera(settings(folder, frames_per_s=None)))
+    [finding] = asyncio.run(probe_camera(settings(recording, frames_per_s=None)))
     assert (finding.verdict, finding.remedy) == ("ok", None)
     assert (finding.found.parameters["width_px"], finding.found.parameters["height_px"]) == (48, 64)
