@@ -11,3 +11,4 @@ BAD_NAME = define(
     longest=Number(),
 )
 NONE = define("lot.none", "no lot was started at the panel")
+ANOTHER = define("lot.another", "lot {lot} is over, and nothing was ended: lot {now} is under way by now")

@@ -159,7 +159,7 @@ class OperatorCommands:
             case OperatorCommandName.START_LOT:
                 why = await self._start_lot(argument, request.grower)
             case _:
-                why = await self._end_lot()
+                why = await self._end_lot(argument)
         self._audit.log_command(by[0], order, argument, why, by[1])
         return why
 
@@ -182,10 +182,11 @@ class OperatorCommands:
         self._lots.set_lot(name)
         return None
 
-    async def _end_lot(self) -> Message | None:
-        name = self._lots.named
-        if not name:
+    async def _end_lot(self, name: str) -> Message | None:
+        if not self._lots.named:
             return lots.NONE()
+        if name != self._lots.named:
+            return lots.ANOTHER(lot=name, now=self._lots.named)
         with contextlib.suppress(RecordsError):  # a lot without a grower was never registered
             await self._records.change(lambda connection: end_lot(connection, name))
         self._lots.set_lot("")
