@@ -78,7 +78,7 @@ async def recipe(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -
 @router.get("/{name}/edit")
 async def edit(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
     """Show the form."""
-    return await _form(request, hmi, locale, name, {}, "")
+    return await _form(request, hmi, locale, name, {})
 
 
 @router.get("/{name}/chart")
@@ -101,20 +101,20 @@ async def save(
     form = await request.form()
     texts = {key: value for key, value in form.items() if isinstance(value, str)}
     values = (await _state(hmi, name)).valid_file.recipe.model_dump(mode="json")
-    typed = _typed(texts)
+    typed, base = _typed(texts), texts.get("base", "")
     try:
         changes = changed(values, typed)
     except BadFieldError as error:
         why = locale.text("recipes.bad_field", field=locale.own(error.field.key, error.field.title),
                            expected=locale.sentence(error.field.expected))  # fmt: skip
-        return await _form(request, hmi, locale, name, typed, why, reason)
+        return await _form(request, hmi, locale, name, typed, base, why, reason)
     if not changes:
-        return await _form(request, hmi, locale, name, typed, locale.text("recipes.nothing_changed"), reason)
+        return await _form(request, hmi, locale, name, typed, base, locale.text("recipes.nothing_changed"), reason)
     try:
-        query = SaveDraft(name=name, values=changes, base=texts.get("base", ""), reason=reason, actor=actor_of(caller))
+        query = SaveDraft(name=name, values=changes, base=base, reason=reason, actor=actor_of(caller))
         await hmi.gateway.request(query, Noted, deadline_s=DEADLINE_S)
     except RefusedError as error:
-        return await _form(request, hmi, locale, name, typed, error.message, reason)
+        return await _form(request, hmi, locale, name, typed, base, error.message, reason)
     return go_to(f"/recipes/{name}")
 
 
@@ -215,11 +215,14 @@ async def _form(
     locale: Locale,
     name: str,
     typed: Mapping[str, str],
-    wrong: str | Message,
+    base: str = "",
+    wrong: str | Message = "",
     reason: str = "",
 ) -> Response:
     known, row = await hmi.past.recipes.read(), await _state(hmi, name)
     stored = row.valid_file.recipe
+    present = content_sha256(stored)
+    base = base or present  # of the form that was opened: typed over a later version, its texts would undo that
     values = stored.model_dump(mode="json")
     made, sign = groups(values), locale.decimal_sign
     texts = {field.path: typed.get(field.path, formatted(field, sign)) for group in made for field in group.fields}
@@ -228,7 +231,8 @@ async def _form(
         "recipe_edit.html.j2",
         status=400 if wrong else 200,
         row=row,
-        base=content_sha256(stored),
+        base=base,
+        outdated=base != present,
         often=[each for each in made if _OFTEN.fullmatch(each.path)],
         rare=[each for each in made if not _OFTEN.fullmatch(each.path)],
         texts=texts,

@@ -9,6 +9,8 @@ from playwright.sync_api import Page, expect
 
 from hmi.recipes.form import BadFieldError, changed, formatted, groups
 from hmi.recipes.strip import strip
+from station.recipe_store.editor import RecipeEditor
+from station.recipe_store.history import Person
 from station.records.audit_report import read_audit
 from station.records.database import reading
 from station.records.marks import place_mark
@@ -101,6 +103,30 @@ def test_a_bad_draft_is_refused_beside_the_form_and_nothing_is_written(orchard: 
     follow(page.get_by_role("button", name="Save as a draft"))
     expect(page.get_by_role("alert")).to_contain_text("growth_mm2_per_mm")
     assert page.locator('[name="v:damage.growth_mm2_per_mm"]').input_value() == "9999"
+    assert file.read_text() == before
+
+
+def test_a_form_sent_again_does_not_undo_what_another_has_changed_meanwhile(orchard: Any, panel: Any) -> None:
+    person, name, field = panel("Quin"), "raspberry", "damage.growth_mm2_per_mm"
+    editor = RecipeEditor(orchard.home, orchard.configuration.recipes_folder)
+    file = orchard.configuration.recipes_folder / f"{name}.yaml"
+    before = file.read_text()
+    page = person.go(f"/recipes/{name}/edit")
+    try:
+        editor.edit(name, {field: 57.0}, Person("Rosa", "quality", "seen on the curves"))
+        theirs = file.read_text()
+        for typed in ("many", "58"):
+            edit(page, field, typed)
+            page.locator("[name=reason]").fill("a little softer")
+            follow(page.get_by_role("button", name="Save as a draft"))
+            expect(page.get_by_role("alert")).to_be_visible()
+            assert page.locator(f'[name="v:{field}"]').input_value() == typed
+        expect(page.get_by_role("alert")).to_contain_text("it was changed since")
+        assert file.read_text() == theirs
+        follow(page.get_by_role("link", name="Open the form with the present values"))
+        assert page.locator(f'[name="v:{field}"]').input_value() == "57"
+    finally:
+        editor.revert(name, Person("Rosa", "quality", "as it was"))
     assert file.read_text() == before
 
 
