@@ -30,6 +30,7 @@ from station.channel.panel_live import (
     OperatorCommand,
     OperatorCommandName,
     OperatorCommandView,
+    PanelState,
     Picture,
 )
 from station.charts.spark import spark
@@ -40,6 +41,7 @@ MOST_RECENT = 10
 _TAKT_OF = 20
 """So many fruit's intervals, of which the median is no pause of the line."""
 ORDER_DEADLINE_S = 5.0
+_FAILED_SHOWN_MS = 60_000
 _MOST_REASONS = 3
 _LEAST_INTERVALS = 3
 _ORDERS = frozenset(
@@ -56,10 +58,18 @@ _IMMUTABLE = "private, max-age=31536000, immutable"
 Sequence = Annotated[int, Path(ge=1, lt=2**32)]
 
 
+def _shown_order(state: PanelState) -> OperatorCommandView | None:
+    """Return the last order while it is in progress, and one that failed for a minute: by then it has been read."""
+    order = next((each for each in state.orders if each.order in _ORDERS), None)
+    if order is None or order.state == "done":
+        return None
+    is_old = order.ended_utc_ms is not None and state.utc_ms - order.ended_utc_ms > _FAILED_SHOWN_MS
+    return None if is_old else order
+
+
 def _activity_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
     state = gateway.state
-    order = next((each for each in state.orders if each.order in _ORDERS), None) if state else None
-    return {"state": state, "order": order}
+    return {"state": state, "order": None if state is None else _shown_order(state)}
 
 
 def _fruit(gateway: Gateway) -> object:
@@ -110,7 +120,7 @@ def _recent_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
 PARTS = {
     "run.activity": Part(
         "run_activity.html.j2",
-        of_state(lambda state: state.model_copy(update={"utc_ms": 0, "devices": ()})),
+        of_state(lambda state: (state.model_copy(update={"utc_ms": 0, "devices": ()}), _shown_order(state))),
         _activity_values,
     ),
     "run.buttons": Part(
