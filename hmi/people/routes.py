@@ -25,7 +25,7 @@ Pin = Annotated[str, Form(max_length=20)]
 Back = Annotated[str, Form(max_length=200)]
 Admin = Annotated[Caller, Depends(orders(Right.MANAGE_PEOPLE))]
 _CHECKING = asyncio.Lock()
-"""One PIN at a time: each takes 19 MiB and a core for a moment."""
+"""One PIN at a time: each takes 19 MiB and a core for a moment. Changes of people wait for it too."""
 
 
 @router.get("/people")
@@ -123,10 +123,11 @@ async def put(
 async def remove(request: Request, hmi: HmiNow, caller: Admin, name: Name) -> Response:
     """Remove a user."""
     try:
-        await asyncio.to_thread(hmi.people.remove, name)
+        async with _CHECKING:  # after a log-in or a new PIN of this person that is under way, which it ends too
+            await asyncio.to_thread(hmi.people.remove, name)
+            hmi.sessions.forget(name)
     except UserStoreError as error:
         return _page(request, hmi, "/", error.key, error.detail)
-    hmi.sessions.forget(name)
     await _note(hmi, caller, "removed", name)
     return go_to("/people")
 

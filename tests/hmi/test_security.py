@@ -1,8 +1,10 @@
 """What the pages refuse, asked without a browser: forged, replayed, oversized and cross-site requests, and roles."""
 
+import asyncio
 import json
 import re
 import stat
+import threading
 import time
 
 import pytest
@@ -240,6 +242,59 @@ class TestLogIn:
         log_in(pages)
         assert pages.post("/people/remove", csrf=pages.token(), name="Ana")[0] == 303
         assert pages.context.sessions.caller(hers).role is Role.VIEWER
+
+    @pytest.mark.parametrize(
+        ("path", "fields"),
+        [
+            ("/people/log-in", {"name": "Ana", "pin": "7391"}),
+            ("/people/own-pin", {"old": "7391", "pin": "8402"}),
+        ],
+    )
+    def test_who_is_removed_while_a_pin_of_hers_is_checked_is_gone(self, pages, monkeypatch, path, fields):
+        people, sessions = pages.context.people, pages.context.sessions
+        people.begin("admin", PIN)
+        people.put("Ana", Role.OPERATOR, "7391")
+        checked, go_on, check = threading.Event(), threading.Event(), UserStore.check
+
+        def blocked(store, name, pin):
+            role = check(store, name, pin)
+            checked.set()
+            assert go_on.wait(60)
+            return role
+
+        def form(name, role):
+            log_in(pages, name, role)
+            return dict(pages.cookies), pages.token()
+
+        (hers, token), (admins, admin_token) = form("Ana", Role.OPERATOR), form("admin", Role.ADMIN)
+        monkeypatch.setattr(UserStore, "check", blocked)
+        monkeypatch.setattr("tests.hmi.conftest.run_apart", lambda work: work)  # both in the loop of this test
+
+        async def scenario():
+            waiting = asyncio.Event()
+
+            class Watched(asyncio.Lock):
+                async def acquire(self):
+                    if self.locked():
+                        waiting.set()
+                    return await super().acquire()
+
+            monkeypatch.setattr("hmi.people.routes._CHECKING", Watched())
+            pages.cookies = hers
+            coming = asyncio.create_task(pages.post(path, csrf=token, **fields))
+            await asyncio.to_thread(checked.wait, 60)
+            pages.cookies = admins
+            removed = asyncio.create_task(pages.post("/people/remove", csrf=admin_token, name="Ana"))
+            turn = asyncio.create_task(waiting.wait())
+            await asyncio.wait({removed, turn}, return_when=asyncio.FIRST_COMPLETED)
+            go_on.set()
+            turn.cancel()
+            return (await coming)[1]["set-cookie"], (await removed)[0]
+
+        cookie, status = asyncio.run(scenario())
+        assert status == 303
+        assert list(people.names()) == ["admin"]
+        assert sessions.caller(cookie.partition(";")[0].partition("=")[2]).role is Role.VIEWER
 
     def test_a_changed_pin_or_role_ends_ones_other_sessions(self, pages):
         pages.context.people.begin("admin", PIN)
