@@ -6,17 +6,19 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Form, Path, Request
 from starlette.responses import Response
 
-from hmi.web.access import HmiNow, orders
+from hmi.web.access import HmiNow, LocaleNow, caller_of, orders
+from hmi.web.context import Hmi
 from hmi.web.gateway import Gateway
 from hmi.web.live import Part, of_state
 from hmi.web.navigation import Entry
-from hmi.web.page import go_to, show
+from hmi.web.page import go_to, show, show_part
+from hmi.web.problem import Problem
 from hmi.web.roles import Right
 from hmi.web.sessions import Caller
 from hmi.web.translation import Locale
 from station.channel.line import CommandDone
 from station.channel.messages import ChannelMessage, RefusedError
-from station.channel.panel import AcknowledgeAlarm, ShelveAlarm, UnshelveAlarm
+from station.channel.panel import AcknowledgeAlarm, ListedAlarm, ShelveAlarm, UnshelveAlarm
 
 router = APIRouter()
 ENTRY = Entry("alarms", "/alarms")
@@ -56,24 +58,27 @@ async def history(request: Request, hmi: HmiNow) -> Response:
 @router.get("/alarms/{alarm}")
 async def one(request: Request, hmi: HmiNow, alarm: AlarmName) -> Response:
     """Show one alarm: its meaning, its effect, the remedy."""
-    present = hmi.gateway.state.alarms if hmi.gateway.state else ()
-    found = next((each for each in present if each.alarm == alarm), None)
-    if found is None:
+    values = _one(request, hmi, alarm)
+    if values is None:
         return go_to("/alarms")
-    return show(
-        request,
-        "alarm.html.j2",
-        alarm=found,
-        acknowledgeable=ACKNOWLEDGEABLE,
-        place=place(alarm),
-        shelves_s=SHELVES_S,
-        reasons=REASONS,
-    )
+    return show(request, "alarm.html.j2", **values, shelves_s=SHELVES_S, reasons=REASONS)
+
+
+@router.get("/alarms/{alarm}/part")
+async def one_part(request: Request, hmi: HmiNow, locale: LocaleNow, alarm: AlarmName) -> Response:
+    """Render the same as a part, for polling; the page reloads itself once the alarm is normal or shelved."""
+    values = _one(request, hmi, alarm)
+    if values is None:
+        return Response(headers={"x-state": "normal"})
+    return show_part(hmi, locale, "alarm_part.html.j2", values, {"x-state": values["shown"]})
 
 
 @router.post("/alarms/{alarm}/acknowledge")
-async def acknowledge(hmi: HmiNow, caller: Operator, alarm: AlarmName) -> Response:
-    """Acknowledge an alarm."""
+async def acknowledge(hmi: HmiNow, caller: Operator, alarm: AlarmName, since: Annotated[int, Form(ge=0)]) -> Response:
+    """Acknowledge an alarm, if it is still the one that became active then: what came later nobody has read."""
+    present = _listed(hmi, alarm)
+    if present is not None and present.since_utc_ms != since:
+        raise Problem(409, "alarms.raised_again")
     await _done(hmi.gateway, AcknowledgeAlarm(alarm=alarm, who=caller.name, role=caller.role))
     return go_to("/alarms")
 
@@ -98,6 +103,26 @@ async def unshelve(hmi: HmiNow, caller: Operator, alarm: AlarmName) -> Response:
     """Unshelve an alarm."""
     await _done(hmi.gateway, UnshelveAlarm(alarm=alarm, who=caller.name, role=caller.role))
     return go_to("/alarms")
+
+
+def _listed(hmi: Hmi, alarm: str) -> ListedAlarm | None:
+    """Return an alarm; None if it is in its normal state, or the station has not answered yet."""
+    present = hmi.gateway.state.alarms if hmi.gateway.state else ()
+    return next((each for each in present if each.alarm == alarm), None)
+
+
+def _one(request: Request, hmi: Hmi, alarm: str) -> dict[str, Any] | None:
+    found = _listed(hmi, alarm)
+    if found is None:
+        return None
+    return {
+        "alarm": found,
+        "shown": "shown" if found.shelved_until_utc_ms is None else "shelved",
+        "acknowledgeable": ACKNOWLEDGEABLE,
+        "place": place(alarm),
+        "may": caller_of(request).may,
+        "Right": Right,
+    }
 
 
 async def _done(gateway: Gateway, request: ChannelMessage) -> None:

@@ -4,12 +4,53 @@ import re
 
 import pytest
 
+from hmi.web.roles import Role
+from station.channel.line import CommandDone
+from station.channel.panel import ListedAlarm
+from station.channel.panel_live import PanelState
+from station.inspection.alarm_table import ALARMS, AlarmId
 from tests.chromium import follow
+from tests.hmi.test_security import log_in
 from tests.slower_mode import SLOWER_MODE
 
 
+@pytest.mark.parametrize("path", ["/alarms", "/alarms/camera_lost"])
+def test_what_was_raised_after_the_page_was_shown_is_not_acknowledged_by_it(pages, monkeypatch, path):
+    sent = []
+
+    async def request(order, _reply, **_):
+        sent.append(order)
+        return CommandDone(done=True, why=None)
+
+    def become(since_ms):
+        row = ALARMS[AlarmId.CAMERA_LOST]
+        alarm = ListedAlarm(
+            alarm="camera_lost", number=row.number, priority="high", state="unacknowledged", active=True, latched=False,
+            detail=None, since_utc_ms=since_ms, raised=1, cause=row.cause, consequence=row.consequence,
+            action=row.action, document="", shelved_until_utc_ms=None, shelved_by="",
+        )  # fmt: skip
+        pages.context.gateway.state = PanelState.model_construct(  # pyrefly: ignore[missing-argument]
+            utc_ms=since_ms, alarms=(alarm,), state="idle", ready=True, busy=False, why_not_ready=None,
+            packml_state=None, recipe=None, simulated=False,
+        )  # fmt: skip
+
+    def acknowledge():
+        form = page.partition('action="/alarms/camera_lost/acknowledge"')[2].partition("</form>")[0]
+        fields = dict(re.findall('name="([^"]+)" value="([^"]*)"', form))
+        return pages.post("/alarms/camera_lost/acknowledge", **{**fields, "csrf": pages.token()})[0]
+
+    monkeypatch.setattr(pages.context.gateway, "request", request)
+    log_in(pages, "Ana", Role.OPERATOR)
+    become(1_790_000_000_000)
+    page = pages("GET", path)[2].decode()
+    become(1_790_000_600_000)
+    assert (acknowledge(), sent) == (409, [])
+    page = pages("GET", path)[2].decode()
+    assert (acknowledge(), len(sent)) == (303, 1)
+
+
 @pytest.mark.timeout(240)
-def test_the_life_of_an_alarm(ready, operator, eventually):
+def test_the_life_of_an_alarm(ready, operator, panel, eventually):
     def life():
         rows = operator.page.locator(".log tbody tr", has_text="camera gives no frames").all_inner_texts()
         return [re.findall("raised|shown again|shelved|returned to normal|acknowledged", row)[0] for row in rows][::-1]
@@ -22,8 +63,12 @@ def test_the_life_of_an_alarm(ready, operator, eventually):
         operator.until(".alarm-line", "tactile camera gives no frames")
         alarm = operator.page.locator(".alarm", has_text="tactile camera gives no frames")
         assert "not acknowledged" in alarm.inner_text()
+        reader = panel()
+        reader.open("/alarms/camera_lost")
+        assert "not acknowledged" in reader.text("article")
         follow(alarm.get_by_role("button", name="Acknowledge"))
         alarm.filter(has_text="acknowledged · since").wait_for()
+        reader.until("article", r"P\d, \w+ · acknowledged · since")
         ready.until(lambda state: [a.state for a in state.alarms if a.alarm == "camera_lost"] == ["acknowledged"])
         follow(operator.page.locator(".alarm", has_text="camera").get_by_role("link", name="Details"))
         assert "Check the camera's cable" in operator.text("article")
@@ -48,6 +93,7 @@ def test_the_life_of_an_alarm(ready, operator, eventually):
     alarm.filter(has_text="returned to normal, not acknowledged").wait_for()
     follow(alarm.get_by_role("button", name="Acknowledge"))
     ready.until(lambda state: not any(a.alarm == "camera_lost" for a in state.alarms))
+    reader.until("h1", "Alarms")  # it is over: the page of it has nothing to show
     follow(operator.page.locator("main").get_by_role("link", name="History"))
 
     def history():  # which is written behind
