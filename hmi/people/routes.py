@@ -1,7 +1,7 @@
 """People page: log-in by PIN, users and their roles, and the cleaning lock."""
 
 import asyncio
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Form, Query, Request
 from starlette.responses import Response
@@ -40,12 +40,12 @@ async def begin(request: Request, hmi: HmiNow, _: GenuineCaller, name: Name, pin
     if not is_this_machines(address_of(request)):
         raise Problem(403, "people.only_here")
     if pin != again:
-        return _page(request, hmi, "/", "people.pin_differs")
+        return _page(request, hmi, wrong="people.pin_differs", name=name)
     try:
         async with _CHECKING:
             await asyncio.to_thread(hmi.people.begin, name, pin)
     except UserStoreError as error:
-        return _page(request, hmi, "/", error.key, error.detail)
+        return _page(request, hmi, wrong=error.key, detail=error.detail, name=name)
     await _note(hmi, Caller(name, Role.ADMIN, ""), "added", name)
     return _logged_in(request, hmi, name, Role.ADMIN, "/people")
 
@@ -57,14 +57,14 @@ async def log_in(
     """Log in; after several wrong PINs each further try is delayed."""
     who = name if name in hmi.people.names() else "", address_of(request)
     if (wait_s := hmi.pins.wait_s(*who)) > 0:
-        return _page(request, hmi, back, "people.wait", str(int(wait_s) + 1), status=429, chosen=name)
+        return _page(request, hmi, back, "people.wait", str(int(wait_s) + 1), status=429, name=name)
     hmi.pins.tried(*who)
     async with _CHECKING:  # a change of this PIN, which comes after it, ends this session too
         role = await asyncio.to_thread(hmi.people.check, name, pin)
         answer = None if role is None else _logged_in(request, hmi, name, role, back)
     if role is None or answer is None:
         await _note(hmi, Caller(name, Role.VIEWER, ""), "log_in_refused", address_of(request))
-        return _page(request, hmi, back, "people.wrong_pin", status=403, chosen=name)
+        return _page(request, hmi, back, "people.wrong_pin", status=403, name=name)
     hmi.pins.right(*who)
     hmi.sessions.log_out(caller.session)
     await _note(hmi, Caller(name, role, ""), "logged_in", address_of(request))
@@ -85,7 +85,7 @@ async def own_pin(request: Request, hmi: HmiNow, caller: GenuineCaller, old: Pin
     """Change one's own PIN; one's other sessions end."""
     who = known(caller).name, address_of(request)
     if (wait_s := hmi.pins.wait_s(*who)) > 0:
-        return _page(request, hmi, "/", "people.wait", str(int(wait_s) + 1), status=429)
+        return _page(request, hmi, wrong="people.wait", detail=str(int(wait_s) + 1), status=429)
     hmi.pins.tried(*who)
     async with _CHECKING:
         role = await asyncio.to_thread(hmi.people.check, caller.name, old)
@@ -94,11 +94,11 @@ async def own_pin(request: Request, hmi: HmiNow, caller: GenuineCaller, old: Pin
             try:
                 await asyncio.to_thread(hmi.people.put, caller.name, role, pin)
             except UserStoreError as error:
-                return _page(request, hmi, "/", error.key, error.detail)
+                return _page(request, hmi, wrong=error.key, detail=error.detail)
             hmi.sessions.forget(caller.name)
     if role is None:
         await _note(hmi, caller, "log_in_refused", address_of(request))
-        return _page(request, hmi, "/", "people.wrong_pin", status=403)
+        return _page(request, hmi, wrong="people.wrong_pin", status=403)
     await _note(hmi, caller, "changed", caller.name)
     return _logged_in(request, hmi, caller.name, role, "/people")
 
@@ -114,7 +114,7 @@ async def put(
             await asyncio.to_thread(hmi.people.put, name, role, pin)
             hmi.sessions.forget(name)
     except UserStoreError as error:
-        return _page(request, hmi, "/", error.key, error.detail)
+        return _page(request, hmi, wrong=error.key, detail=error.detail, form="put", name=name, role=role)
     await _note(hmi, caller, "changed" if known else "added", f"{name}: {role}")
     return _logged_in(request, hmi, name, role, "/people") if name == caller.name else go_to("/people")
 
@@ -127,7 +127,7 @@ async def remove(request: Request, hmi: HmiNow, caller: Admin, name: Name) -> Re
             await asyncio.to_thread(hmi.people.remove, name)
             hmi.sessions.forget(name)
     except UserStoreError as error:
-        return _page(request, hmi, "/", error.key, error.detail)
+        return _page(request, hmi, wrong=error.key, detail=error.detail, form="remove")
     await _note(hmi, caller, "removed", name)
     return go_to("/people")
 
@@ -140,8 +140,18 @@ async def clean(hmi: HmiNow, caller: GenuineCaller) -> Response:
 
 
 def _page(
-    request: Request, hmi: Hmi, back: str, wrong: str = "", detail: str = "", *, status: int = 0, chosen: str = ""
+    request: Request,
+    hmi: Hmi,
+    back: str = "/",
+    wrong: str = "",
+    detail: str = "",
+    *,
+    status: int = 0,
+    form: Literal["own", "put", "remove"] = "own",
+    name: str = "",
+    role: Role | None = None,
 ) -> Response:
+    """Show the page; with an error, at the form that was sent, with the name and the role as they were sent."""
     return show(
         request,
         "people.html.j2",
@@ -149,7 +159,9 @@ def _page(
         back=back if _is_ours(back) else "/",
         wrong=wrong,
         detail=detail,
-        chosen=chosen,
+        form=form,
+        chosen=name,
+        chosen_role=role,
         people=hmi.people.names(),
         broken=hmi.people.broken,
         here=is_this_machines(address_of(request)),

@@ -35,6 +35,7 @@ def show(request: Request, template: str, *, status: int = 200, **values: Any) -
         "settings": hmi.settings,
         "entries": entries(),
         "path": request.url.path,
+        "is_page": request.method == "GET",  # an order's address is none to come back to
         "first_start": hmi.people.first_start,
         "token": lambda: hmi.sessions.token(caller.session),
         "on_panel": at_panel(request),

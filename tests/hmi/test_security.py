@@ -188,6 +188,33 @@ class TestLogIn:
         assert again[0] == 400
         assert list(pages.context.people.names()) == ["admin"]
 
+    def test_the_first_start_keeps_the_name_that_was_typed(self, pages):
+        body = pages.post("/people/begin", csrf=pages.token(), name="Maria", pin=PIN, again=OTHER_PIN)[2]
+        assert b'autocomplete="off" value="Maria"' in body
+        body = pages.post("/people/begin", csrf=pages.token(), name="Maria", pin="123456", again="123456")[2]
+        assert b'autocomplete="off" value="Maria"' in body
+
+    def test_what_is_wrong_with_a_new_person_is_said_at_their_form_which_keeps_its_texts(self, pages):
+        pages.context.people.begin("admin", PIN)
+        log_in(pages)
+        status, _, body = pages.post("/people/put", csrf=pages.token(), name="Maria", role="quality", pin="12")
+        own, others = body.decode().split('<section class="card stack">')[1:]
+        assert (status, "A PIN has" in own, "<details open" in own) == (400, False, False)
+        form = others.partition("<details open>")[2]
+        assert "A PIN has 6 to 12 digits" in form
+        assert '<input name="name" value="Maria"' in form
+        assert '<option value="quality" selected>' in form
+        body = pages.post("/people/remove", csrf=pages.token(), name="admin")[2].decode()
+        own, others = body.split("<h2>People</h2>")
+        assert ("one administrator" in own, "one administrator" in others) == (False, True)
+
+    def test_who_logs_in_after_a_wrong_pin_comes_to_a_page(self, pages):
+        pages.context.people.begin("admin", PIN)
+        body = pages.post("/people/log-in", csrf=pages.token(), name="admin", pin=OTHER_PIN, back="/change/3")[2]
+        back = body.decode().partition('class="button quiet" href="/people?back=')[2].partition('"')[0]
+        _, headers, _ = pages.post("/people/log-in", csrf=pages.token(), name="admin", pin=PIN, back=back)
+        assert pages("GET", headers["location"])[0] == 200
+
     def test_the_first_start_is_at_the_station_itself(self, pages):
         pages.asked_from = "192.0.2.7"
         assert b"/people/begin" not in pages("GET", "/people")[2]
