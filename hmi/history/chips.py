@@ -20,9 +20,10 @@ class Chip(NamedTuple):
 
 
 class Days(NamedTuple):
-    """The day that is shown, and the addresses of those beside it."""
+    """The day that is searched, and the addresses of those beside it."""
 
-    utc_ms: int
+    utc_ms: int | None
+    """None where the search is not of one day; then the addresses are those beside today, or beside its begin."""
     before: str
     after: str
 
@@ -45,16 +46,28 @@ def chips(terms: Terms, lot: str | None, today: datetime) -> list[Chip]:
 
 
 def days(terms: Terms, today: datetime) -> Days:
-    """Return the day of the search, today where it has none, and the days beside it."""
+    """Return the day of the search, if it is of one, and the days beside it or beside today."""
     try:
         return _beside(terms, datetime.fromisoformat(terms["from"]).astimezone())
     except (ValueError, OverflowError):  # a day beside the calendar's first or last
         return _beside(terms, today)
 
 
+def unseen(terms: Terms, lot: str | None, day: Days) -> bool:
+    """Return whether the search has a condition that neither a chip nor the date shows."""
+    seen = {
+        "lot": terms["lot"] == lot,
+        "outcome": terms["outcome"] in {"FAIL", "NO_RESULT"},
+        "from": day.utc_ms is not None,
+        "to": day.utc_ms is not None,
+    }
+    return any(value and not seen.get(name) for name, value in terms.items())
+
+
 def _beside(terms: Terms, shown: datetime) -> Days:
     before, after = (_address(terms, _day(shown + timedelta(days=step))) for step in (-1, 1))
-    return Days(round(1000 * shown.timestamp()), before, after)
+    is_day = {name: terms[name] for name in ("from", "to")} == _day(shown)
+    return Days(round(1000 * shown.timestamp()) if is_day else None, before, after)
 
 
 def _day(at: datetime) -> dict[str, str]:

@@ -12,7 +12,7 @@ from starlette.responses import Response
 
 from hmi.common.charts import area_over_closing, deciding_limit, mark_decided
 from hmi.history.audit_sentences import sentence
-from hmi.history.chips import chips, days
+from hmi.history.chips import chips, days, unseen
 from hmi.history.export_options import check_text, options_of
 from hmi.past.past import FullRecord, Page, Stages, judged_of
 from hmi.web.access import GenuineCaller, HmiNow, LocaleNow, caller_of, known
@@ -82,7 +82,8 @@ async def search(
         return go_to(f"/history/{int(typed)}")
     terms = {"lot": lot, "grower": grower, "fruit": fruit, "outcome": outcome, "reason": reason}
     terms |= {"from": begun_from, "to": begun_to}
-    today = datetime.now().astimezone()
+    today, current_lot = datetime.now().astimezone(), hmi.gateway.state.lot if hmi.gateway.state else None
+    day = days(terms, today)
     wanted = None if typed else search_of(lot, grower, fruit, outcome, reason, begun_from, begun_to)
     found = Page((), None) if wanted is None else await hmi.past.find(wanted, PAGE, below)
     recipes = (await hmi.past.recipes.read()).states
@@ -91,8 +92,9 @@ async def search(
         "history.html.j2",
         status=200 if wanted is not None else 400,
         terms=terms,
-        chips=chips(terms, hmi.gateway.state.lot if hmi.gateway.state else None, today),
-        days=days(terms, today),
+        chips=chips(terms, current_lot, today),
+        days=day,
+        unseen=unseen(terms, current_lot, day),
         bad=wanted is None,
         found=found,
         below=below,

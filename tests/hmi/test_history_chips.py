@@ -5,7 +5,8 @@ from urllib.parse import parse_qs, urlencode, urlsplit
 
 import pytest
 
-from hmi.history.chips import chips, days
+from hmi.history.chips import chips, days, unseen
+from hmi.past.past import Page
 
 NAMES: list[str] = ["lot", "grower", "fruit", "outcome", "reason", "from", "to"]
 NO_TERMS = dict.fromkeys(NAMES, "")
@@ -42,3 +43,40 @@ def test_an_end_of_the_calendar_has_no_day_beside_it(pages, day):
     assert days({**NO_TERMS, "from": day}, NOW) == days(NO_TERMS, NOW)
     with pages.context.past:
         assert pages("GET", f"/history?{urlencode({'from': day})}")[0] < 500
+
+
+DAY = {"from": "2026-02-28T00:00", "to": "2026-03-01T00:00"}
+
+
+@pytest.mark.parametrize(
+    ("terms", "is_unseen", "dated"),
+    [
+        ({}, False, False),
+        ({"outcome": "FAIL", **DAY}, False, True),
+        ({"lot": "A-17"}, True, False),
+        ({"grower": "West"}, True, False),
+        ({"fruit": "raspberry", **DAY}, True, True),
+        ({"reason": "late"}, True, False),
+        ({"outcome": "PASS"}, True, False),
+        ({"from": "2026-02-28T00:00"}, True, False),
+        ({**DAY, "to": "2026-03-02T00:00"}, True, False),
+    ],
+)
+def test_every_condition_is_seen_and_a_date_only_where_it_is_searched(pages, monkeypatch, terms, is_unseen, dated):
+    async def found(*_):
+        return Page((), None)
+
+    monkeypatch.setattr(pages.context.past, "find", found)
+    with pages.context.past:
+        status, _, body = pages("GET", f"/history?{urlencode(terms)}")
+    assert status == 200
+    text = body.decode()
+    assert ('<details class="card" open>' in text) == is_unseen
+    label = text.partition('<span class="days">')[2].partition("</span>")[0]
+    assert ("<b>2026-02-28</b>" in label, "<b>" in label) == (dated, dated)
+
+
+def test_the_current_lot_is_seen_in_its_chip():
+    terms = {**NO_TERMS, "lot": "A-17"}
+    assert not unseen(terms, "A-17", days(terms, NOW))
+    assert unseen(terms, "B-18", days(terms, NOW))
