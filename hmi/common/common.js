@@ -55,6 +55,7 @@
     const everyMs = Number(part.dataset.everyMs);
     const age = aging(part);
     let pauseMs = everyMs;
+    let filled = null;
     while (part.isConnected) {
       await new Promise((done) => setTimeout(done, pauseMs));
       if (document.hidden) {
@@ -69,12 +70,14 @@
         }
         const top = part.querySelector(".scroll") ? part.querySelector(".scroll").scrollTop : 0;
         const focused = document.activeElement && part.contains(document.activeElement);
-        if (part.innerHTML !== html) {
-          part.innerHTML = html;
+        // Compared with what was fetched: the browser's own markup of it may differ.
+        if (filled !== html && !renewal.isPressed(part)) {
+          renewal.fill(part, html);
+          filled = html;
           const scroll = part.querySelector(".scroll");
           if (scroll) {
             scroll.scrollTop = top;
-            if (focused) {
+            if (focused && !part.contains(document.activeElement)) {
               scroll.focus({ preventScroll: true });
             }
           }

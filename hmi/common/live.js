@@ -42,19 +42,24 @@
       }
       coming.delete(name);
       if (part && part.dataset.digest !== digest) {
-        const focused = part.contains(document.activeElement) ? document.activeElement.id : "";
-        part.innerHTML = html;
+        fill(part, html);
         part.dataset.digest = digest;
-        if (focused && document.getElementById(focused)) {
-          document.getElementById(focused).focus();
-        }
-        part.dispatchEvent(new CustomEvent("renewed", { bubbles: true }));
       }
     }
   }
 
+  // What has the focus keeps it, if its new self has the same id.
+  function fill(part, html) {
+    const focused = part.contains(document.activeElement) ? document.activeElement.id : "";
+    part.innerHTML = html;
+    if (focused && document.getElementById(focused)) {
+      document.getElementById(focused).focus({ preventScroll: true });
+    }
+    part.dispatchEvent(new CustomEvent("renewed", { bubbles: true }));
+  }
+
   const press = (event) => {
-    pressed = event.target instanceof Element ? event.target.closest("[data-live]") : null;
+    pressed = event.target instanceof Element ? event.target.closest("[data-live], [data-poll]") : null;
   };
   const lift = () =>
     setTimeout(() => {
@@ -128,6 +133,7 @@
   }
 
   globalThis.staleness = { staleMs: STALE_MS, words: oldWords };
+  globalThis.renewal = { fill, isPressed: (part) => part === pressed };
   document.addEventListener("visibilitychange", () => (document.hidden ? close() : open()));
   window.addEventListener("pagehide", close);
   window.addEventListener("pageshow", (event) => event.persisted && location.reload());

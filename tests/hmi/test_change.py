@@ -80,6 +80,24 @@ def test_an_open_page_follows_a_change_that_another_made(ready, panel):
 
 
 @pytest.mark.timeout(240)
+def test_a_fruit_that_has_the_focus_keeps_it_while_the_page_is_renewed(ready, panel):
+    shown = panel()
+    shown.open("/change")
+    renewed = lambda: shown.page.expect_response("**/change/part")  # noqa: E731
+    with renewed():
+        pass
+    shown.page.locator("#fruit-3").focus()
+    shown.page.evaluate("document.activeElement.isTheSame = true")
+    for _ in range(3):  # the part is as it was before the next one is fetched
+        with renewed():
+            pass
+    assert shown.page.evaluate("[document.activeElement.id, document.activeElement.isTheSame]") == ["fruit-3", True]
+    ready.choose("raspberry")
+    shown.until("#fruit-3.active", "Raspberry")
+    assert shown.page.evaluate("document.activeElement.id") == "fruit-3", "where the part is made anew, by its id"
+
+
+@pytest.mark.timeout(240)
 def test_the_fruit_is_changed_while_a_fruit_is_running(ready, operator):
     operator.open("/change")
     touches = 0

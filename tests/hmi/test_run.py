@@ -134,6 +134,17 @@ def test_a_fruit_is_shown_with_its_curve_and_its_picture(ready, panel, eventuall
 
 
 @pytest.mark.timeout(240)
+def test_a_button_that_has_the_focus_keeps_it_when_a_fruit_comes(ready, operator):
+    operator.open("/")
+    operator.page.locator("#order-stop").focus()
+    operator.page.evaluate("document.activeElement.isOld = true")
+    outcome = ready.end(ready.begin())
+    operator.page.locator(f"#tile-{outcome.sequence}").wait_for()
+    shown = operator.page.evaluate("[document.activeElement.id, document.activeElement.isOld]")
+    assert shown == ["order-stop", None], "the buttons were made anew: Abort came and went"
+
+
+@pytest.mark.timeout(240)
 def test_what_stops_has_to_be_held_and_works_by_keyboard(ready, operator, eventually):
     operator.open("/")
     stop = operator.page.get_by_role("button", name="Stop")
