@@ -13,13 +13,17 @@
   let clockOffset = null;
   const coming = new Map();
   let pressed = null;
+  let loggedOut = false;
 
   const age = () => (ageThen < 0 ? Infinity : ageThen + performance.now() - heardAt);
 
   function take(reply) {
-    if (reply.boot !== body.dataset.boot || reply.caller !== body.dataset.caller) {
-      location.reload();
-      return;
+    if (loggedOut || reply.boot !== body.dataset.boot || reply.caller !== body.dataset.caller) {
+      if (!keepTyped()) {
+        location.reload();
+        return;
+      }
+      loggedOut = true;
     }
     heardAt = performance.now();
     ageThen = reply.age_ms === null ? -1 : reply.age_ms;
@@ -31,6 +35,24 @@
     }
     renew();
     look();
+  }
+
+  // What a person has typed into an order's form outlasts the log-in, to be copied; the form cannot be sent any more.
+  // In the answer to an order it is the form's own: a reload would send that again.
+  function keepTyped() {
+    if (body.dataset.caller.startsWith("|")) {
+      return false;
+    }
+    const isTyped = (each) =>
+      each.options
+        ? each.selectedIndex !== Math.max(0, [...each.options].findIndex((option) => option.defaultSelected))
+        : each.value !== each.defaultValue;
+    const fields = [...document.querySelectorAll('form[method="post"] :is(textarea, select, input:not([type]))')];
+    const typed = fields.filter((each) => "answer" in body.dataset || isTyped(each));
+    for (const field of typed) {
+      field.form.querySelectorAll("button").forEach((button) => (button.disabled = true));
+    }
+    return typed.length > 0;
   }
 
   // A part with a finger on it stays as it is until that is lifted: what is touched must not be another thing by then.
@@ -105,7 +127,8 @@
       part.inert = stale;
     }
     if (line) {
-      const text = !stale ? "" : old === Infinity ? line.dataset.never : oldWords(old);
+      const fresh = loggedOut ? line.dataset.loggedOut : "";
+      const text = !stale ? fresh : old === Infinity ? line.dataset.never : oldWords(old);
       if (line.textContent !== text) {
         line.textContent = text;
       }

@@ -95,6 +95,8 @@
   const wire = (root) => root.querySelectorAll("[data-hold]").forEach(holdable);
   wire(document);
   document.addEventListener("renewed", (event) => wire(event.target));
-  document.addEventListener("pointerdown", here);
-  document.addEventListener("keydown", here);
+  // By a wheel too, who reads on; not by "scroll", which a page that renews itself causes as well.
+  for (const name of ["pointerdown", "keydown", "wheel"]) {
+    document.addEventListener(name, here, { passive: true });
+  }
 })();

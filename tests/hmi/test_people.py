@@ -29,11 +29,39 @@ def test_who_may_do_what_and_who_is_idle(people, panel, tmp_path, free_hmi):
     said = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
     assert re.search(r"panel\.logged_in .* by Ana \(operator\)", said), said
     # Another process of the pages, with the shortest idle time: who touches nothing is a viewer again.
-    hasty = panel(free_hmi(people, STATION_HMI_IDLE_S="10"))
+    address = free_hmi(people, STATION_HMI_IDLE_S="10")
+    typist, refused = panel(address), panel(address)
+    for each in (typist, refused):
+        each.log_in("admin", "482915")
+        each.open("/maintenance/configuration")
+    refused.page.locator("textarea").fill("modbus: [")
+    follow(refused.page.get_by_role("button", name="Check and save"))
+    typist.page.locator("textarea").press_sequentially("# half a")
+    text = typist.page.locator("textarea").input_value()
+    hasty = panel(address)
     hasty.log_in("Ana", "7391")
     hasty.until(".who", "Ana")
     hasty.until(".who", "Log in")
     assert "Ana" not in hasty.text(".who")
+    # Unless that would throw away what was typed.
+    typist.until(".stale-line", "You were logged out. What you typed is still here")
+    assert "# half a" in text
+    assert typist.page.locator("textarea").input_value() == text
+    assert typist.page.get_by_role("button", name="Check and save").is_disabled()
+    typist.page.locator("textarea").fill(typist.page.locator("textarea").evaluate("each => each.defaultValue"))
+    typist.until(".who", "Log in")
+    refused.until(".stale-line", "You were logged out")
+    assert refused.page.locator("textarea").input_value() == "modbus: ["
+
+
+@pytest.mark.timeout(120)
+def test_who_reads_on_by_the_wheel_is_there(operator, eventually):
+    told = []
+    operator.page.on("request", lambda request: told.append(request.url) if request.url.endswith("/here") else None)
+    operator.open("/")
+    operator.page.mouse.move(600, 400)
+    assert not told
+    eventually(lambda: operator.page.mouse.wheel(0, 50) or told)
 
 
 @pytest.mark.timeout(120)
