@@ -68,7 +68,9 @@ ARM_NOT_REMOTE = AlarmTexts(
     ),
     _REFUSED,
     define(
-        "alarm.action.arm_not_remote", "Switch the pendant to remote control, then `station devices recover program`."
+        "alarm.action.arm_not_remote",
+        "Switch the pendant to remote control, then start the arm's program on the page Run, or by"
+        " `station devices recover program`.",
     ),
 )
 ARM_NOT_READY = AlarmTexts(

@@ -60,7 +60,7 @@ REMEDY_WAIT = define("gripper.remedy_wait", "wait: the station activates it wher
 JAWS_UNKNOWN = define("gripper.jaws_unknown", "it is not activated, and what is between its jaws is not known")
 REMEDY_EMPTY_JAWS = define(
     "gripper.remedy_empty_jaws",
-    "take out what is between them, then reset the station: the jaws travel their whole way",
+    "take out what is between them, then press Start on the page Run: the jaws travel their whole way",
 )
 STOPPED = define("gripper.stopped", "the move was stopped on request")
 REMEDY_STOPPED = define("gripper.remedy_stopped", "start the next move when it is wanted")

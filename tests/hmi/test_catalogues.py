@@ -1,5 +1,6 @@
 """The message catalogues of all languages: complete, with the source's braces, and read by ids."""
 
+import re
 from types import ModuleType
 
 import pytest
@@ -9,6 +10,7 @@ from babel.messages.pofile import read_po
 from hmi.web import catalogues, translation
 from hmi.web.catalogues import findings, sources, translated, update
 from hmi.web.folders import FOLDERS, HMI
+from hmi.web.navigation import entries
 from hmi.web.text import define, define_plural, texts
 from hmi.web.translation import Locale
 from station import messages
@@ -145,3 +147,20 @@ def test_a_text_without_a_translation_is_english():
 
 def test_a_language_has_a_name_of_its_own():
     assert [Locale.name_of(language) for language in LANGUAGES][:3] == ["English", "Deutsch", "Español"]
+
+
+@pytest.mark.parametrize(("language", "word"), [("en", "page"), ("de", "Seite"), ("es", "página")])
+def test_a_page_that_a_text_names_is_one_of_the_navigation(language, word):
+    pages = tuple(Locale(language).text(f"nav.{entry.name}") for entry in entries())
+    named = re.compile(rf"\b{word} (?=[A-ZÄÖÜÁÉÍÓÚ])")
+    found = {
+        key: text[place.end() :]
+        for file, english in sources().items()
+        for key, forms in (
+            english if language == "en" else translation._read([catalogues.ROOT / file.format(language)], language)
+        ).items()
+        for text in forms
+        for place in named.finditer(text)
+    }
+    assert len(found) > 5
+    assert {key: rest for key, rest in found.items() if not rest.startswith(pages)} == {}
