@@ -17,7 +17,7 @@ from hmi.web.access import (
 )
 from hmi.web.gateway import Gateway
 from hmi.web.live import Part, of_state
-from hmi.web.page import go_to
+from hmi.web.page import go_to, is_ours
 from hmi.web.problem import Problem
 from hmi.web.streams import Stream
 from hmi.web.translation import Locale
@@ -85,7 +85,7 @@ async def language(
     """Set the language of this browser."""
     if language not in hmi.settings.languages:
         raise Problem(400, "problem.bad_form")
-    answer = go_to(back if back.startswith("/") and not back.startswith(("//", "/\\")) else "/")
+    answer = go_to(back if is_ours(back) else "/")
     answer.set_cookie(
         LANGUAGE_COOKIE, language, max_age=_A_YEAR_S, secure=hmi.settings.tls.enabled, httponly=True, samesite="strict"
     )

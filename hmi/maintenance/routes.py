@@ -138,7 +138,7 @@ async def jog(
     try:
         match to:
             case "width":
-                query = JogGripper(to=to, width_mm=float(width_mm.replace(",", ".")), actor=actor_of(caller))
+                query = JogGripper(to=to, width_mm=_mm(width_mm), actor=actor_of(caller))
             case "wider" | "narrower":
                 width = await _stepped(hmi, JOG_STEP_MM if to == "wider" else -JOG_STEP_MM)
                 query = JogGripper(to="width", width_mm=width, actor=actor_of(caller))

@@ -10,7 +10,7 @@ from hmi.web.access import GenuineCaller, HmiNow, address_of, known, orders
 from hmi.web.context import Hmi
 from hmi.web.gateway import actor_of
 from hmi.web.navigation import Entry
-from hmi.web.page import give_session, go_to, show
+from hmi.web.page import give_session, go_to, is_ours, show
 from hmi.web.problem import Problem
 from hmi.web.roles import Right, Role
 from hmi.web.sessions import Caller
@@ -156,7 +156,7 @@ def _page(
         request,
         "people.html.j2",
         status=status or (400 if wrong else 200),
-        back=back if _is_ours(back) else "/",
+        back=back if is_ours(back) else "/",
         wrong=wrong,
         detail=detail,
         form=form,
@@ -171,14 +171,9 @@ def _page(
 
 
 def _logged_in(request: Request, hmi: Hmi, name: str, role: Role, back: str) -> Response:
-    answer = go_to(back if _is_ours(back) else "/")
+    answer = go_to(back if is_ours(back) else "/")
     give_session(request, answer, hmi.sessions.log_in(name, role))
     return answer
-
-
-def _is_ours(address: str) -> bool:
-    """Return whether the address to go back to is a page of ours, and not inserted by a foreign page."""
-    return address.startswith("/") and not address.startswith(("//", "/\\")) and address.isprintable()
 
 
 async def _note(hmi: Hmi, caller: Caller, what: str, subject: str = "") -> None:

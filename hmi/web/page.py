@@ -69,6 +69,11 @@ def go_to(address: str) -> RedirectResponse:
     return RedirectResponse(address, 303)
 
 
+def is_ours(address: str) -> bool:
+    """Return whether the address to go back to is a page of ours, and not inserted by a foreign page."""
+    return address.startswith("/") and not address.startswith(("//", "/\\")) and address.isprintable()
+
+
 def _live(hmi: Hmi, locale: Locale, role: Role, name: str) -> Markup:
     filled = hmi.live.part(name, locale, role)
     return Markup('<div data-live="{}" data-digest="{}">{}</div>').format(name, filled.digest, filled.html)

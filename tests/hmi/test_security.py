@@ -137,7 +137,9 @@ class TestRequests:
         assert pages("GET", "/live?part=secret")[0] == 404
         assert pages("GET", "/nowhere")[0] == 404
 
-    @pytest.mark.parametrize("back", ["//evil.example", "/\\evil.example", "https://evil.example", "javascript:x"])
+    @pytest.mark.parametrize(
+        "back", ["//evil.example", "/\\evil.example", "https://evil.example", "javascript:x", "/\t/evil.example"]
+    )
     def test_nobody_is_sent_to_a_foreign_page(self, pages, back):
         _, headers, _ = pages.post("/language", csrf=pages.token(), language="de", back=back)
         assert headers["location"] == "/"
