@@ -1,6 +1,7 @@
 """PLC commands between fruits, and the line's state as the PLC interface reports it."""
 
 import asyncio
+import contextlib
 import logging
 import time
 from typing import Any
@@ -35,11 +36,14 @@ PRODUCTION, MAINTENANCE, MANUAL = 1, 2, 3
 """PackML's unit modes; in manual mode a person moves things by hand."""
 MODES = (PRODUCTION, MAINTENANCE, MANUAL)
 _STOPPED, _MODE = "stopped_by_a_person", "mode"
+_AT_ONCE = {CommandName.CALL_OFF, CommandName.CLEAR_ALARMS}
+"""Wait for no other command: a change of recipe lasts until the very fruit that is to be called off has left."""
+_JUDGED = {State.RECORDING_ACCEPT, State.RECORDING_REJECT}
 _ON_ALARMS: dict[CommandName, AlarmChange] = {CommandName.CLEAR_ALARMS: "acknowledged", CommandName.RESET: "reset"}
 
 
 class PlcCommands:
-    """Executes the PLC's commands, one after the other; the state files store stop and mode for a restart."""
+    """Executes the PLC's commands, most of them one after the other; the state files store stop and mode."""
 
     def __init__(
         self,
@@ -133,7 +137,7 @@ class PlcCommands:
         """Execute one command by the name and role of who gave it."""
         log.info("%s (%s) orders %s %s", *by, command.command, command.argument)
         before, alarms = self._value_before(command.command), self._service.alarms.alarms
-        async with self._turn:
+        async with contextlib.nullcontext() if command.command in _AT_ONCE else self._turn:
             try:
                 async with asyncio.timeout(DEADLINE_S):
                     why = await self._execute(command)
@@ -257,8 +261,8 @@ class PlcCommands:
             busy = STATES[service.state].refusal is Refusal.BUSY
             return messages.JUDGED() if busy else None
         service.runner.post(Event.CALLED_OFF, operation.CALLED_OFF())
-        await service.runner.until(lambda state: state not in UNJUDGED)
-        return None
+        reached = await service.runner.until(lambda state: state not in UNJUDGED)
+        return messages.JUDGED() if reached in _JUDGED else None  # its judgement may have come first
 
     def reset_refusal(self) -> Message | None:
         """Return why a reset would do nothing now; None if it would work."""

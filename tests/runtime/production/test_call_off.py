@@ -1,10 +1,11 @@
-"""A fruit that is aborted at the panel: that one, and no later one."""
+"""A fruit that is aborted by the PLC or at the panel: that one at once, and no later one."""
 
 import asyncio
 
 import pytest
 
 from station.channel.client import ChannelClient
+from station.channel.line import CommandName
 from station.channel.panel import Actor
 from station.channel.panel_live import (
     GetPanelState,
@@ -15,8 +16,11 @@ from station.channel.panel_live import (
 )
 from station.inspection.states import State
 from station.messages import commands
+from station.runtime.cycle.actions import Inspector
+from station.runtime.production.plc_commands import PlcCommands
 from station.settings.hmi import panel_endpoint
 from station.vocabulary import Reason
+from tests.quick_recipes import NUMBERS
 
 
 @pytest.mark.timeout(240)
@@ -50,3 +54,50 @@ def test_a_button_that_was_pressed_for_the_fruit_before_aborts_none(bench):
     assert late.why == commands.ANOTHER_FRUIT(sequence=str(outcome.sequence - 1))
     assert (late.state, meant.state) == ("failed", "done")
     assert outcome.reasons[0] is Reason.CALLED_OFF
+
+
+@pytest.mark.timeout(240)
+def test_a_call_off_does_not_wait_for_a_change_of_recipe_that_waits_for_the_fruit(bench, monkeypatch):
+    made, restore = [], PlcCommands.restore
+    monkeypatch.setattr(PlcCommands, "restore", lambda self: made.append(self) or restore(self))
+
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("strawberry")
+            inspected = asyncio.create_task(cell.line.inspect())
+            await cell.reach(State.CLOSING_TO_ONSET)
+            changing = asyncio.create_task(cell.line.order(CommandName.CHANGE_RECIPE, NUMBERS["blueberry"]))
+            while not made[0].recipe_changing:
+                await asyncio.sleep(0)
+            called_off = await cell.line.order(CommandName.CALL_OFF)
+            return called_off, await inspected, await changing, await cell.line.state()
+
+    called_off, outcome, changed, state = asyncio.run(scenario())
+    assert called_off.done, called_off.why
+    assert outcome.reasons[0] is Reason.CALLED_OFF
+    assert changed.done, changed.why
+    assert state.recipe_number == NUMBERS["blueberry"]
+
+
+@pytest.mark.timeout(240)
+def test_a_call_off_that_comes_with_the_judgement_is_not_done(bench, monkeypatch):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("strawberry")
+            runner, judge, judged = cell.station.service.runner, Inspector.judge, asyncio.Event()
+
+            async def held(self, now):
+                event = await judge(self, now)
+                await judged.wait()
+                return event
+
+            monkeypatch.setattr(Inspector, "judge", held)
+            inspected = asyncio.create_task(cell.line.inspect())
+            await cell.reach(State.JUDGING)
+            # The judgement's event is taken before the other, which then changes nothing.
+            monkeypatch.setattr(runner, "post", lambda *_: judged.set())
+            return await cell.line.order(CommandName.CALL_OFF), await inspected
+
+    done, outcome = asyncio.run(scenario())
+    assert (done.done, done.why) == (False, commands.JUDGED())
+    assert Reason.CALLED_OFF not in outcome.reasons
