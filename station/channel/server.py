@@ -2,8 +2,10 @@
 
 import asyncio
 import logging
+import math
 import time
 from collections.abc import Awaitable, Callable, Mapping
+from contextvars import ContextVar
 from typing import Any
 
 import zmq
@@ -20,6 +22,14 @@ Handler = Callable[[Any], Awaitable[ChannelMessage]]
 Handlers = Mapping[type[ChannelMessage], Handler]
 
 log = logging.getLogger(__name__)
+
+_EXPIRES_S = ContextVar("expires_s", default=math.inf)
+"""Of the request that this task handles; monotonic."""
+
+
+def is_expired() -> bool:
+    """Return whether the client of the request that is handled has stopped waiting for its answer."""
+    return time.monotonic() > _EXPIRES_S.get()
 
 
 class ChannelServer:
@@ -71,12 +81,12 @@ class ChannelServer:
         self._context.term()
 
     async def _answer(self, client: bytes, envelope: bytes, name: bytes, body: bytes) -> None:
-        _, expires_s = ENVELOPE.unpack(envelope)
-        status, answer = await self._carry_out(name.decode("utf-8", "replace"), body, expires_s)
+        _EXPIRES_S.set(ENVELOPE.unpack(envelope)[1])
+        status, answer = await self._carry_out(name.decode("utf-8", "replace"), body)
         await self._socket.send_multipart([client, envelope, status, answer])
 
-    async def _carry_out(self, name: str, body: bytes, expires_s: float) -> tuple[bytes, bytes]:
-        if time.monotonic() > expires_s:
+    async def _carry_out(self, name: str, body: bytes) -> tuple[bytes, bytes]:
+        if is_expired():
             return _refused(messages.TOO_LATE(request=name))
         if name not in self._handlers:
             return _refused(messages.UNKNOWN_REQUEST(request=name))

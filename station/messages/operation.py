@@ -59,6 +59,9 @@ PHASE_LATE = define(
 )
 NOT_STORED_IN_TIME = define("operation.not_stored_in_time", "the outcome could not be stored in time")
 ANOTHER_OUTCOME = define("operation.another_outcome", "the PLC got another outcome for this fruit meanwhile")
+TRIGGER_GIVEN_UP = define(
+    "operation.trigger_given_up", "the trigger was accepted too late: the PLC has read that it is refused"
+)
 STATION_ENDS = define("operation.station_ends", "the station was ended")
 STOPPED_AT_PANEL = define("operation.stopped_at_panel", "a person stopped the station at the panel")
 CALLED_OFF = define("operation.called_off", "the PLC or a person called the inspection off")

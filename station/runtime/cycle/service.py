@@ -214,9 +214,13 @@ class Service:
             self._metrics.inspection(fruit, outcome, *known)
             self._outcomes.add(outcome)
             self._on_published(outcome)
+        self.abort(outcome.sequence, messages.ANOTHER_OUTCOME())
+
+    def abort(self, sequence: int, why: Message) -> None:
+        """End an inspection with NO_RESULT, if it is under way and not judged yet."""
         running = self.registry.running
-        if running is not None and running.sequence == outcome.sequence and self.state in UNJUDGED:
-            self.runner.post(Event.CALLED_OFF, messages.ANOTHER_OUTCOME())
+        if running is not None and running.sequence == sequence and self.state in UNJUDGED:
+            self.runner.post(Event.CALLED_OFF, why)
 
     # Actions of the cycle: see `Performer`.
 

@@ -1,5 +1,7 @@
 """Channel server of the station: answers the PLC interface and the commands of people at the cell."""
 
+import logging
+
 from station.channel.line import (
     Acknowledged,
     AwaitOutcome,
@@ -15,10 +17,13 @@ from station.channel.line import (
     StationState,
 )
 from station.channel.panel import Recover
-from station.channel.server import ChannelServer
+from station.channel.server import ChannelServer, is_expired
+from station.messages.operation import TRIGGER_GIVEN_UP
 from station.runtime.alarms.commands import AlarmCommands
 from station.runtime.production.production import Production
 from station.vocabulary import Refusal
+
+log = logging.getLogger(__name__)
 
 
 class PlcInterfaceServer:
@@ -57,7 +62,15 @@ class PlcInterfaceServer:
         if refusal is None and not await self._lots.begin(lot):
             refusal = Refusal.NOT_READY
         refusal = refusal or self._interlock.refusal()[0]  # the mode may have changed while the lot began
-        return await self._service.begin(request, refusal, lot)
+        # The PLC has read a refusal where the answer comes too late, and may move the fruit.
+        if is_expired():
+            refusal = Refusal.STATION_LOST
+        begun = await self._service.begin(request, refusal, lot)
+        if is_expired():
+            log.warning("trigger %d was answered too late: the PLC has read that it is refused", request.trigger_id)
+            if begun.sequence is not None:
+                self._service.abort(begun.sequence, TRIGGER_GIVEN_UP())
+        return begun
 
     async def _outcome(self, request: AwaitOutcome) -> Outcome:
         return await self._service.registry.outcome(request.sequence)

@@ -3,7 +3,10 @@
 import asyncio
 import threading
 
+import pytest
+
 from station.channel.line import Begin, BeginReply, CommandName
+from station.channel.messages import DeadlineError
 from station.inspection.states import State
 from station.messages import lots, recipes
 from station.recipe_store.editor import RecipeEditor
@@ -13,7 +16,7 @@ from station.records.audit_check import check_audit
 from station.records.audit_head import read_head
 from station.records.audit_report import read_audit
 from station.records.database import reading, records_folder
-from station.vocabulary import Refusal
+from station.vocabulary import Reason, Refusal
 
 IDA, BO = Person("Ida", "quality", "riper"), Person("Bo", "quality", "looked at lot 17")
 
@@ -94,6 +97,60 @@ def test_a_trigger_during_whose_lots_begin_the_mode_was_changed_is_refused(bench
     asyncio.run(scenario())
 
 
-async def begin(cell, trigger_id, lot):
+def test_a_trigger_whose_answer_is_not_waited_for_any_more_begins_nothing(bench, monkeypatch):
+    """The PLC was told that it is refused, and may move the fruit."""
+    storing, stored = threading.Event(), threading.Event()
+
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            recipes = cell.station.recipes
+            store_active = recipes.store_active
+
+            def slow(*of):
+                storing.set()
+                assert stored.wait(60)
+                return store_active(*of)
+
+            monkeypatch.setattr(recipes, "store_active", slow)
+            given_up = asyncio.create_task(begin(cell, 900, "LOT 2", deadline_s=3))
+            assert await asyncio.to_thread(storing.wait, 60)
+            with pytest.raises(DeadlineError):
+                await given_up
+            following = asyncio.create_task(begin(cell, 901, "LOT 2"))
+            stored.set()
+            begun = await following
+            assert begun.refusal is None
+            assert (await cell.line.outcome(begun.sequence)).trigger_id == 901
+            assert [each.trigger_id for each in (await cell.line.open()).outcomes] == [901]
+
+    asyncio.run(scenario())
+
+
+def test_a_trigger_that_is_durable_after_its_answer_was_waited_for_is_called_off(bench, monkeypatch):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            records, free = cell.station.service.registry.records, asyncio.Event()
+            store = records.begin
+
+            async def slow(trigger):
+                sequence = await store(trigger)
+                await free.wait()
+                return sequence
+
+            monkeypatch.setattr(records, "begin", slow)
+            with pytest.raises(DeadlineError):
+                await begin(cell, 900, "LOT 2", deadline_s=3)
+            free.set()
+            await cell.line.ready()
+            return (await cell.line.open()).outcomes
+
+    (outcome,) = asyncio.run(scenario())
+    assert (outcome.trigger_id, outcome.outcome, outcome.reasons[0]) == (900, "NO_RESULT", Reason.CALLED_OFF)
+
+
+async def begin(cell, trigger_id, lot, deadline_s=20.0):
     await cell.line.ready()
-    return await cell.line.client.request(Begin(trigger_id=trigger_id, encoder=7, lot=lot), BeginReply, deadline_s=20)
+    request = Begin(trigger_id=trigger_id, encoder=7, lot=lot)
+    return await cell.line.client.request(request, BeginReply, deadline_s=deadline_s)
