@@ -19,7 +19,8 @@ class LotManager:
 
     def __init__(self, service: Service, recipes: ActiveRecipes, audit: AuditLogger) -> None:
         self._service, self._recipes, self._audit = service, recipes, audit
-        self._turn = asyncio.Lock()
+        self._turn, self._file = asyncio.Lock(), asyncio.Lock()
+        self._storing: asyncio.Task[bool] | None = None
         self.lot: str | None = None
         """The lot under way; None before the first fruit of one."""
         self.named = ""
@@ -43,11 +44,11 @@ class LotManager:
         active, self.lot = remembered
         self._service.set_active(active)
 
-    def choose(self, active: ActiveRecipe) -> bool:
+    async def choose(self, active: ActiveRecipe) -> bool:
         """Set the recipe of the next lot, and return whether it is stored; a lot under way continues with its own."""
         self.mismatch = None
         self._service.set_active(active)
-        return self._recipes.store_active(active, self.lot)
+        return await self._store()
 
     def lot_of(self, named_by_plc: str) -> str:
         """Return the lot of a fruit, for which the PLC's name may be empty."""
@@ -90,8 +91,20 @@ class LotManager:
                     PLC, PLC, "lot.started", f"lot {lot}", "", {"lot": before, **_audited(active)}, _audited(now)
                 )
             )
-            await asyncio.to_thread(self._recipes.store_active, now, lot)
+            await self._store()
             return True
+
+    async def _store(self) -> bool:
+        """Store the active recipe and the lot for the next start, and return whether they are stored."""
+        # A write that outlasts its order is not left behind, or it could replace the next order's.
+        self._storing = asyncio.create_task(self._store_last())
+        return await asyncio.shield(self._storing)
+
+    async def _store_last(self) -> bool:
+        """Make them durable; the last order's are what the file has at the end."""
+        async with self._file:
+            active = self._service.active
+            return active is not None and await asyncio.to_thread(self._recipes.store_active, active, self.lot)
 
 
 def _audited(active: ActiveRecipe) -> dict[str, str | int]:

@@ -211,7 +211,7 @@ class PlcCommands:
         self.recipe_changing = True
         try:
             await self._service.runner.until(lambda state: STATES[state].refusal is not Refusal.BUSY)
-            kept = self._lots.choose(found)
+            kept = await self._lots.choose(found)
             log.info("recipe %s (%d) is active", found.recipe.name, found.recipe.plc_number)
         finally:
             self.recipe_changing = False

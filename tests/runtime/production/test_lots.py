@@ -8,7 +8,7 @@ import pytest
 from station.channel.line import Begin, BeginReply, CommandName
 from station.channel.messages import DeadlineError
 from station.inspection.states import State
-from station.messages import lots, recipes
+from station.messages import lots, readiness, recipes
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
 from station.recipe_store.store import RecipeStore
@@ -17,6 +17,7 @@ from station.records.audit_head import read_head
 from station.records.audit_report import read_audit
 from station.records.database import reading, records_folder
 from station.vocabulary import Reason, Refusal
+from tests.quick_recipes import NUMBERS
 
 IDA, BO = Person("Ida", "quality", "riper"), Person("Bo", "quality", "looked at lot 17")
 
@@ -95,6 +96,61 @@ def test_a_trigger_during_whose_lots_begin_the_mode_was_changed_is_refused(bench
             assert cell.phase is State.IDLE
 
     asyncio.run(scenario())
+
+
+def test_the_station_answers_while_the_disk_takes_a_chosen_recipe(bench, monkeypatch):
+    storing, stored = threading.Event(), threading.Event()
+
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            book = cell.station.recipes
+            store_active = book.store_active
+
+            def slow(*of):
+                storing.set()
+                assert stored.wait(5)
+                return store_active(*of)
+
+            monkeypatch.setattr(book, "store_active", slow)
+            changing = asyncio.create_task(cell.line.order(CommandName.CHANGE_RECIPE, NUMBERS["raspberry"]))
+            assert await asyncio.to_thread(storing.wait, 60)
+            state = await cell.line.state()
+            stored.set()
+            return state, await changing
+
+    state, changed = asyncio.run(scenario())
+    assert state.why_not_ready == readiness.RECIPE_CHANGING()
+    assert changed.done, changed.why
+
+
+def test_the_last_recipe_is_what_the_file_has_also_where_the_disk_outlasts_the_lots_begin(bench, monkeypatch):
+    storing, stored = threading.Event(), threading.Event()
+
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            book, service = cell.station.recipes, cell.station.service
+            store_active = book.store_active
+
+            def slow_once(*of):
+                if not storing.is_set():
+                    storing.set()
+                    assert stored.wait(60)
+                return store_active(*of)
+
+            monkeypatch.setattr(book, "store_active", slow_once)
+            beginning = asyncio.create_task(begin(cell, 900, "LOT 2"))
+            assert await asyncio.to_thread(storing.wait, 60)
+            changing = asyncio.create_task(cell.line.order(CommandName.CHANGE_RECIPE, NUMBERS["raspberry"]))
+            await cell.until(lambda: service.active.snapshot.name == "raspberry")
+            stored.set()
+            await beginning
+            return await changing, book.restored()
+
+    changed, restored = asyncio.run(scenario())
+    assert changed.done, changed.why
+    assert restored.active.snapshot.name == "raspberry"
 
 
 def test_a_trigger_whose_answer_is_not_waited_for_any_more_begins_nothing(bench, monkeypatch):
