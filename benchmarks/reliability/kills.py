@@ -250,7 +250,7 @@ class _Run:
         await self.rig.twin(do="remove")
         if self.held == "protective stop":
             await self.rig.carry_out("recover protective-stop")
-        if not await self.rig.carry_out("reset"):
+        if not await self.rig.carry_out("start" if self.held == "person's stop" else "reset"):
             self.wrong.append("the person's reset was not carried out")
 
     def _check_outcome(self, expected: int, *, may_be_refused: bool) -> None:

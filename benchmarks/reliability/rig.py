@@ -221,21 +221,28 @@ class Rig:
         """Do what a person does. Whether it worked."""
         if remedy == "reset":
             return await self.wire.reset()
+        if remedy == "start":
+            return (await self._order_at_the_panel(OperatorCommandName.START)).state != "failed"
         command = [sys.executable, "-m", "station", "devices", *remedy.split(), "--yes", "--config", str(self._file)]
         done = await asyncio.to_thread(subprocess.run, command, capture_output=True, timeout=90, check=False)
         return done.returncode == 0
 
     async def stop_at_the_panel(self) -> bool:
         """Stop the station as a person does. Whether the pages show it."""
+        await self._order_at_the_panel(OperatorCommandName.STOP)
         endpoint = panel_endpoint(self.configuration.hmi, self.configuration.home)
-        order = OperatorCommand(person=Actor(who="bench", role="operator"), order=OperatorCommandName.STOP)
         async with ChannelClient(endpoint, "the station") as panel:
-            await panel.request(order, OperatorCommandView, deadline_s=_STOP_S)
             ends_s = time.monotonic() + _STOP_S
             while time.monotonic() < ends_s:
                 if (await panel.request(GetPanelState(), PanelState, deadline_s=_STOP_S)).stopping:
                     return True
         return False
+
+    async def _order_at_the_panel(self, name: OperatorCommandName) -> OperatorCommandView:
+        endpoint = panel_endpoint(self.configuration.hmi, self.configuration.home)
+        order = OperatorCommand(person=Actor(who="bench", role="operator"), order=name)
+        async with ChannelClient(endpoint, "the station") as panel:
+            return await panel.request(order, OperatorCommandView, deadline_s=_STOP_S)
 
     async def choose_recipe(self) -> None:
         """Make the fruit's recipe the active one, then give the right to write away."""

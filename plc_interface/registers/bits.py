@@ -114,7 +114,8 @@ REFUSAL_CODES = {
 
 _COMMANDS: Mapping[CommandName, str] = {
     CommandName.CHANGE_RECIPE: "Argument: the recipe's number; takes effect between fruits",
-    CommandName.RESET: "Leave a stop whose cause is gone; never a protective or emergency stop",
+    CommandName.RESET: "A person has made sure that nothing is between the jaws: leave a stop whose cause is gone, "
+    "none that a person ordered at the panel, no protective or emergency stop. Never sent by a program by itself",
     CommandName.CALL_OFF: "End the running inspection with NO_RESULT",
     CommandName.SET_MODE: "Argument: PackML mode, 1 production, 2 maintenance, 3 manual",
     CommandName.CLEAR_ALARMS: "Acknowledge every alarm whose cause is gone",

@@ -21,7 +21,7 @@ class CommandName(StrEnum):
     CHANGE_RECIPE = "change_recipe"
     """Argument: the recipe's PLC number. Takes effect between fruits."""
     RESET = "reset"
-    """Leave a stop whose cause is gone; never a protective or emergency stop, which are a person's."""
+    """Leave a stop whose cause is gone; never a person's at the panel, or a protective or emergency stop."""
     CALL_OFF = "call_off"
     """End the running inspection with NO_RESULT."""
     SET_MODE = "set_mode"

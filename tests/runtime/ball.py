@@ -27,16 +27,21 @@ PRESSED_S = 240.0
 """Longest wait for a whole press of the ball, on a busy machine."""
 
 
-async def stop(panel: ChannelClient) -> None:
-    """*Stop*, to its end: the first answer may come before."""
-    order = OperatorCommand(person=MAX, order=OperatorCommandName.STOP)
+async def give(panel: ChannelClient, name: OperatorCommandName) -> OperatorCommandView:
+    """An order, to its end: the first answer may come before."""
+    order = OperatorCommand(person=MAX, order=name)
     given = await panel.request(order, OperatorCommandView, deadline_s=20)
 
     async def ended() -> OperatorCommandView | None:
         orders = (await panel.request(GetPanelState(), PanelState, deadline_s=20)).orders
         return next((each for each in orders if each.ticket == given.ticket and each.state != "executing"), None)
 
-    assert (await eventually(ended)).state == "done"
+    return await eventually(ended)
+
+
+async def stop(panel: ChannelClient) -> None:
+    """*Stop*."""
+    assert (await give(panel, OperatorCommandName.STOP)).state == "done"
 
 
 async def start_run(panel: ChannelClient, places: tuple[tuple[float, float], ...] = PLACES) -> None:

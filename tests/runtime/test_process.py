@@ -19,7 +19,7 @@ from station.channel.panel_live import (
     OperatorCommandView,
     PanelState,
 )
-from station.messages import commands, states
+from station.messages import commands, readiness, states
 from station.settings.configuration import load_configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
@@ -193,6 +193,10 @@ def test_what_only_a_person_may_end_outlives_kills_and_nothing_moves_meanwhile(c
             assert done.done, done.why
             await line.ready()
 
+    async def ready():
+        async with cell.line() as line:
+            await line.ready()
+
     outcome = asyncio.run(kill_while_carrying(cell.service()))
     for _ in range(2):
         service = cell.service()
@@ -228,8 +232,10 @@ def test_what_only_a_person_may_end_outlives_kills_and_nothing_moves_meanwhile(c
     service.kill()
     service.wait()
     service = cell.service()
-    asyncio.run(is_held(PackmlState.STOPPED, states.STOPPED()))
-    asyncio.run(reset())
+    asyncio.run(is_held(PackmlState.STOPPED, readiness.STOPPED_BY_PERSON()))
+    started = asyncio.run(at_the_panel(cell.file, order(OperatorCommandName.START), OperatorCommandView))
+    assert started.state != "failed", started.why
+    asyncio.run(ready())
 
 
 @pytest.mark.timeout(240)

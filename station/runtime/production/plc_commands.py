@@ -14,7 +14,7 @@ from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import UNJUDGED, WAITING, Event
 from station.inspection.states import STATES, State
 from station.messages import commands as messages
-from station.messages import operation
+from station.messages import operation, readiness
 from station.messages.maintenance import UNDER_WAY
 from station.messages.message import Message, message_of
 from station.runtime.cycle.service import Service
@@ -140,7 +140,7 @@ class PlcCommands:
         async with contextlib.nullcontext() if command.command in _AT_ONCE else self._turn:
             try:
                 async with asyncio.timeout(DEADLINE_S):
-                    why = await self._execute(command)
+                    why = await self._execute(command, by)
             except TimeoutError:
                 why = messages.TOO_SLOW(command=command.command, limit_s=DEADLINE_S, activity=self._activity())
         if why is not None:
@@ -165,12 +165,12 @@ class PlcCommands:
             case _:
                 return {"state": str(self._service.state)}
 
-    async def _execute(self, command: Command) -> Message | None:
+    async def _execute(self, command: Command, by: tuple[str, str]) -> Message | None:
         match command.command:
             case CommandName.CHANGE_RECIPE:
                 return await self._change_recipe(command.argument)
             case CommandName.RESET:
-                return await self._reset()
+                return await self._reset(by)
             case CommandName.CALL_OFF:
                 return await self._call_off()
             case CommandName.SET_MODE:
@@ -275,10 +275,11 @@ class PlcCommands:
         busy = STATES[self._service.state].refusal is Refusal.BUSY
         return messages.BUSY_CALL_OFF() if busy else None
 
-    async def _reset(self) -> Message | None:
+    async def _reset(self, by: tuple[str, str]) -> Message | None:
         service = self._service
         await service.runner.taken()  # a stop may be on its way, which this reset comes after
-        if why_not := self.reset_refusal():
+        kept = self._stop_wanted and by == (PLC, PLC)  # a hand may be at the gel, and a program resets by itself
+        if why_not := self.reset_refusal() or (readiness.STOPPED_BY_PERSON() if kept else None):
             return why_not
         state, self._stop_wanted = service.state, False
         service.allow()

@@ -38,10 +38,10 @@ class Interlock:
         service, facts = self._service, STATES[self._service.state]
         if service.ending:
             return Refusal.NOT_READY, messages.ENDING()
+        if service.stopped_by_person and (facts.refusal is None or service.state is State.STOPPED):
+            return Refusal.NOT_READY, messages.STOPPED_BY_PERSON()
         if facts.refusal is not None:
             return facts.refusal, self._trouble() or facts.reason
-        if service.stopped_by_person:
-            return Refusal.NOT_READY, messages.STOPPED_BY_PERSON()
         return self._idle_refusal()
 
     def _idle_refusal(self) -> tuple[Refusal | None, Message | None]:

@@ -15,7 +15,7 @@ from station.messages.maintenance import UNDER_WAY
 from station.runtime.devices.manager import CAMERA, GRIPPER
 from station.runtime.production.plc_commands import MANUAL
 from station.runtime.state_files import StateFiles
-from tests.runtime.ball import MAX, end_run, run_now, start_run, stop, until_waits
+from tests.runtime.ball import MAX, end_run, give, run_now, start_run, stop, until_waits
 
 
 @pytest.mark.timeout(500)
@@ -37,8 +37,8 @@ def test_a_reset_while_the_ball_is_pressed_is_refused_and_moves_nothing(at_ball)
             await until_waits(cell, panel)
             assert entered == [State.STOPPED]
             assert (await end_run(panel)).state == "ended"
-            done = await cell.line.order(CommandName.RESET)
-            assert done.done, done.why
+            started = await give(panel, OperatorCommandName.START)
+            assert started.state == "done", started.why
             assert cell.phase is State.IDLE
 
     asyncio.run(scenario())
@@ -129,12 +129,11 @@ def test_a_reset_that_waited_for_the_disk_while_a_run_began_moves_nothing(at_bal
         async with at_ball() as (cell, panel, entered):
             await stop(panel)
             monkeypatch.setattr(StateFiles, "write", slow)
-            reset = asyncio.create_task(cell.line.order(CommandName.RESET))
+            starting = asyncio.create_task(give(panel, OperatorCommandName.START))
             await cell.until(begun.is_set)
             await start_run(panel)
             written.set()
-            refused = await reset
-            assert (refused.done, refused.why) == (False, UNDER_WAY(activity=A_CALIBRATION()))
+            assert (await starting).why == UNDER_WAY(activity=A_CALIBRATION())
             await cell.station.service.runner.taken()
             assert entered == [State.STOPPED]
             await end_run(panel)

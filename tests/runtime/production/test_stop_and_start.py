@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from station.channel.client import ChannelClient
-from station.channel.line import Command, CommandName
+from station.channel.line import Command, CommandName, PackmlState
 from station.channel.panel import Actor
 from station.channel.panel_live import (
     GetPanelState,
@@ -16,7 +16,7 @@ from station.channel.panel_live import (
 )
 from station.devices.gripper.errors import GripperUnreachableError
 from station.inspection.states import State
-from station.messages import commands
+from station.messages import commands, readiness
 from station.runtime.production.plc_commands import PlcCommands
 from station.settings.hmi import panel_endpoint
 
@@ -70,9 +70,43 @@ def test_a_start_right_after_a_stop_starts_a_station_that_the_stop_has_yet_to_re
             stopping = asyncio.create_task(orders.stop())
             while not service.stopped_by_person:
                 await asyncio.sleep(0)
-            started = await orders.execute(Command(command=CommandName.RESET, argument=0))
+            started = await orders.execute(Command(command=CommandName.RESET, argument=0), ("Ada", "operator"))
             assert started.done, started.why
             await stopping
             assert cell.phase is State.IDLE
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_a_persons_stop_is_ended_by_a_person_and_not_by_a_plc_that_resets_by_itself(bench):
+    """Also after a restart: the person may have a hand at the gel."""
+
+    async def give(cell, order):
+        configuration = cell.configuration
+        async with ChannelClient(panel_endpoint(configuration.hmi, configuration.home), "the station") as panel:
+            request = OperatorCommand(person=Actor(who="Ada", role="operator"), order=order)
+            await panel.request(request, OperatorCommandView, deadline_s=20)
+
+    async def plc_resets(cell):
+        done = await cell.line.order(CommandName.RESET)
+        assert (done.done, done.why) == (False, readiness.STOPPED_BY_PERSON())
+        return await cell.line.state()
+
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("strawberry")
+            await cell.line.ready()
+            await give(cell, OperatorCommandName.STOP)
+            await cell.reach(State.STOPPED)
+            state = await plc_resets(cell)
+            assert (state.packml_state, state.why_not_ready) == (PackmlState.STOPPED, readiness.STOPPED_BY_PERSON())
+        async with bench() as cell:
+            cell.twin.world.remove()
+            await cell.until(lambda: cell.phase in {State.UNKNOWN, State.HELD, State.STOPPED})
+            await plc_resets(cell)
+            await give(cell, OperatorCommandName.START)
+            await cell.reach(State.IDLE)
+            assert (await cell.line.order(CommandName.RESET)).done
 
     asyncio.run(scenario())
