@@ -346,7 +346,7 @@ class Inspector:
         """Let the fruit go: in the nest, where the line diverts it, or where its outcome belongs."""
         carried = self._settings.placing == "arm" and self._devices.cell.arm is not None
         if carried:
-            await self._rig(now).go("above_nest", "accept" if now.outcome_name == "PASS" else "reject")
+            await self._rig(now).go("above_nest", "accept" if now.is_accepted else "reject")
         await self._let_go(None if carried else self._width_around(now))
         return Event.PLACED
 

@@ -72,6 +72,14 @@ class Inspection:
     measures: dict[str, float | int | str | bool | None] = field(default_factory=dict)
     standing: Outcome | None = None
     """What the records hold."""
+    published: Outcome | None = None
+    """What the PLC was given, which may be NO_RESULT for a fruit that was judged in time and recorded too late."""
+
+    @property
+    def is_accepted(self) -> bool:
+        """Whether the fruit passes: by its final outcome, where the PLC has one."""
+        final = self.published or self.standing
+        return final is not None and final.outcome == "PASS"
 
     @property
     def next_width_mm(self) -> float:

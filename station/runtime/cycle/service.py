@@ -205,10 +205,12 @@ class Service:
 
     async def published(self, outcome: Outcome) -> None:
         """Store that the PLC was given a final outcome, and count it, once; cancel a fruit still under inspection."""
+        now = self.triggers.inspection(outcome.sequence)
+        if now is not None:
+            now.published = outcome
         first = await self.registry.records.published(outcome)
         self.triggers.ended(outcome)
         if first:
-            now = self.triggers.inspection(outcome.sequence)
             fruit = "" if now is None else now.active.recipe.name
             known = (None, None) if now is None else (now.phases_s, now.limits.inspection_s)
             self._metrics.inspection(fruit, outcome, *known)

@@ -29,20 +29,51 @@ def active(cell):
     return {alarm.id for alarm in cell.station.service.alarms.alarms.active}
 
 
+def places_of(cell):
+    """The arm's places at which it is now."""
+    [arm] = [server for server in cell.twin._servers if isinstance(server, UrController)]
+    poses = cell.configuration.arm.poses
+    places = {name: poses.joints_rad(name) for name in ("nest", "accept", "reject", "above_nest")}
+    return [
+        name
+        for name, joints in places.items()
+        if all(abs(a - b) < REACHED_RAD for a, b in zip(joints, arm.joints_rad, strict=True))
+    ]
+
+
+@pytest.mark.timeout(240)
+def test_a_fruit_whose_outcome_came_too_late_for_the_plc_is_carried_to_reject(bench, monkeypatch):
+    async def scenario():
+        async with bench(bench=False, placing="arm") as cell:
+            assert (await cell.line.order(CommandName.CHANGE_RECIPE, 2)).done
+            await cell.until(lambda: cell.phase is State.IDLE, patience_s=150)
+            cell.lay("blueberry", 1)
+            records = cell.station.service.registry.records
+            conclude = records.conclude
+
+            async def slow(*of):
+                judged = await conclude(*of)
+                assert judged.outcome == "PASS"
+                late = {"outcome": "NO_RESULT", "reasons": (Reason.LATE,), "late": True}
+                await cell.line.publish(judged.model_copy(update=late))
+                return judged
+
+            monkeypatch.setattr(records, "conclude", slow)
+            let_go = []
+            cell.at(State.RETREATING_READY, lambda: let_go.extend(places_of(cell)))
+            assert (await cell.line.begin()).refusal is None
+            await cell.until(lambda: let_go)
+            return let_go
+
+    assert asyncio.run(scenario()) == ["reject"]
+
+
 @pytest.mark.timeout(240)
 def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_for_its_own_stop(bench):
     async def scenario():
         async with bench(bench=False, placing="arm") as cell:
             [arm] = [server for server in cell.twin._servers if isinstance(server, UrController)]
-            poses, line = cell.configuration.arm.poses, cell.line
-
-            def stands_at():
-                places = {name: poses.joints_rad(name) for name in ("nest", "accept", "reject", "above_nest")}
-                return [
-                    name
-                    for name, joints in places.items()
-                    if all(abs(a - b) < REACHED_RAD for a, b in zip(joints, arm.joints_rad, strict=True))
-                ]
+            line = cell.line
 
             assert (await line.order(CommandName.CHANGE_RECIPE, 2)).done
             # The arm's program is uploaded, and the gripper activated at home.
@@ -51,7 +82,7 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
                 await line.ready()
                 cell.lay("blueberry", 1, bruised=bruised)
                 let_go = []
-                cell.at(State.RETREATING_READY, lambda let_go=let_go: let_go.extend(stands_at()))
+                cell.at(State.RETREATING_READY, lambda let_go=let_go: let_go.extend(places_of(cell)))
                 outcome = await line.inspect()
                 await line.ready()
                 assert (outcome.outcome == "PASS") == (pose == "accept"), outcome
@@ -73,7 +104,7 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
             assert done.done, done.why
             await line.ready()
             assert AlarmId.FRUIT_HELD not in active(cell)
-            assert stands_at() == ["above_nest"]
+            assert places_of(cell) == ["above_nest"]
 
             crew = cell.station.service._devices
             renew, crew.renew_health = crew.renew_health, lambda _lease_s: None
