@@ -85,8 +85,9 @@ class BeginReply(ChannelMessage):
     sequence: int | None = Field(default=None, ge=1, lt=2**32)
     """None where refused."""
     refusal: Refusal | None = None
-    deadline_s: float = Field(default=0.0, ge=0, le=600, allow_inf_nan=False)
-    """From now: the latest time at which the station itself ends this inspection, if need be with NO_RESULT."""
+    deadline_s: float = Field(default=0.0, ge=0, le=601, allow_inf_nan=False)
+    """From now: the latest time at which the station itself ends this inspection, if need be with NO_RESULT: the
+    inspection's own deadline, 600 s at most, and 1 s for the record."""
 
 
 class AwaitOutcome(ChannelMessage):

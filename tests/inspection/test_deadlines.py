@@ -12,6 +12,7 @@ from station.inspection.cycle import TABLE, Event
 from station.inspection.deadlines import FAULT_OF, LONGEST_S, Pace, deadlines, late
 from station.inspection.second_press import FREED_BY_MM
 from station.inspection.states import STATES, State
+from station.runtime.cycle.pacing import RECORD_NO_RESULT_S
 from station.settings.recipe import load_recipe
 from station.vocabulary import Refusal
 
@@ -200,7 +201,7 @@ def test_late_names_what_was_waited_for_and_the_inspection_first():
 def test_a_recipe_that_takes_longer_than_the_plc_can_be_told_is_refused():
     with pytest.raises(BadInputError, match=r"recipe strawberry: an inspection may take \d+ s here.*shorter settle"):
         deadlines(changed(settle_s=10.0, number=100, stop_when_decided=False), PACE)
-    assert BeginReply.model_fields["deadline_s"].metadata[1].le == LONGEST_S
+    assert BeginReply.model_fields["deadline_s"].metadata[1].le == LONGEST_S + RECORD_NO_RESULT_S
 
 
 def test_an_inspection_may_take_exactly_what_the_plc_can_be_told(monkeypatch):

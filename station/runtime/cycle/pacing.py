@@ -62,7 +62,7 @@ class Pacing:
     def limits(self, recipe: Recipe) -> Deadlines:
         """The limits of a recipe that `check` has passed, with the site's patience and its deadline of all of it."""
         expected, settings = self.expected(recipe), self._configuration.service
-        own_s = min(settings.patience * expected.inspection_s, LONGEST_S - RECORD_NO_RESULT_S)
+        own_s = min(settings.patience * expected.inspection_s, LONGEST_S)
         return expected._replace(
             phases_s={state: settings.patience * limit_s for state, limit_s in expected.phases_s.items()},
             inspection_s=own_s if settings.inspection_deadline_s is None else settings.inspection_deadline_s,

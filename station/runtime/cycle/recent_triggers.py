@@ -70,6 +70,11 @@ class PendingTrigger:
         if not self.is_answered:
             self._answer.set_result(begun)
 
+    def fail(self, error: Exception) -> None:
+        """End the request without an answer, if it has none: it would keep every later one waiting."""
+        if not self.is_answered:
+            self._answer.set_exception(error)
+
     async def answered(self) -> BeginReply:
-        """Wait for the answer."""
+        """Wait for the answer, or raise what has ended the request without one."""
         return await asyncio.shield(self._answer)

@@ -355,9 +355,14 @@ class Service:
     def _take_on(self, pending: PendingTrigger) -> None:
         now = pending.inspection
         now.accepted_s = time.monotonic()
-        self.triggers.accepted(now)
-        self.registry.accepted(now)
-        pending.answer(BeginReply(sequence=now.sequence, deadline_s=now.limits.inspection_s + RECORD_NO_RESULT_S))
+        try:
+            self.triggers.accepted(now)
+            self.registry.accepted(now)
+            reply = BeginReply(sequence=now.sequence, deadline_s=now.limits.inspection_s + RECORD_NO_RESULT_S)
+        except Exception as error:
+            pending.fail(error)
+            raise
+        pending.answer(reply)
 
     # Small parts.
 

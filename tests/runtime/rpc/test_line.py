@@ -8,11 +8,11 @@ import pytest
 from station.channel.line import CommandName, Outcome, PackmlState
 from station.channel.messages import RefusedError
 from station.inspection.alarm_table import ALARMS, AlarmId
-from station.inspection.deadlines import deadlines
+from station.inspection.deadlines import LONGEST_S, deadlines
 from station.inspection.states import State
 from station.messages import readiness
 from station.messages.recipes import NOT_FOR_INSPECTIONS
-from station.runtime.cycle import pacing
+from station.runtime.cycle import pacing, service
 from station.vocabulary import Reason, Refusal
 
 
@@ -145,6 +145,35 @@ def test_the_papers_method_by_which_no_fruit_passes_is_refused_for_inspections(b
             await cell.choose("strawberry")
 
     asyncio.run(scenario())
+
+
+def test_the_longest_deadline_that_a_site_may_set_is_told_with_the_answer(bench):
+    async def scenario():
+        async with bench(inspection_deadline_s=LONGEST_S) as cell:
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            begun = await cell.line.begin()
+            await cell.line.publish(await cell.line.outcome(begun.sequence))
+            return begun
+
+    assert asyncio.run(scenario()).deadline_s == LONGEST_S + pacing.RECORD_NO_RESULT_S
+
+
+def test_a_trigger_that_cannot_be_answered_keeps_no_later_one_waiting(bench, monkeypatch):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            with monkeypatch.context() as broken:
+                broken.setattr(service, "RECORD_NO_RESULT_S", LONGEST_S)
+                with pytest.raises(RefusedError, match="deadline_s"):
+                    await cell.line.begin()
+            cell.lay("blueberry", 2)
+            return await cell.line.inspect(), (await cell.line.open()).outcomes
+
+    after, (failed,) = asyncio.run(scenario())
+    assert (failed.outcome, failed.reasons[0]) == ("NO_RESULT", Reason.INTERNAL_FAULT)
+    assert after.sequence == failed.sequence + 1
 
 
 def test_late_is_no_result(bench, monkeypatch):

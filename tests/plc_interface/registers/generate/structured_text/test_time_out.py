@@ -8,7 +8,7 @@ import pytest
 
 from plc_interface.registers.generate.scl import s7_1500
 from plc_interface.registers.generate.structured_text import example, function_block
-from station.runtime.cycle.pacing import Pacing
+from station.runtime.cycle.pacing import RECORD_NO_RESULT_S, Pacing
 from station.settings.configuration import Configuration
 from station.settings.recipe import load_recipes
 
@@ -25,8 +25,8 @@ def test_the_block_waits_longer_than_the_shipped_station_takes(recipe):
         arm=object(),
     )
     deadline_s = Pacing(configuration, cell).limits(load_recipes()[recipe]).inspection_s
-    result_deadline_ms = 1000 * (deadline_s + configuration.handshake.result_margin_s)
-    assert result_deadline_ms == 15_300
+    result_deadline_ms = 1000 * (deadline_s + RECORD_NO_RESULT_S + configuration.handshake.result_margin_s)
+    assert result_deadline_ms == 16_300
     for text in (function_block(), example(), s7_1500()):
         times_out_s = re.findall(r"inspection_timeout [:A-Z ]*:= T#(\d+)s", text)
         assert times_out_s
