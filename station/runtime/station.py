@@ -116,7 +116,6 @@ class Station:
         # The first start of a release may migrate the records of years, which takes longer than any other start.
         async with extended_start():
             await service.registry.reopen(lambda: alarms.restore(records))
-        alarms.report_lost_records(records.notices)
         self.recipes = book = ActiveRecipes(configuration.recipes_folder, kept)
         await asyncio.to_thread(book.read)
         lots = LotManager(service, book, audit)

@@ -173,7 +173,10 @@ class AlarmManager:
             self._publish_active()
 
     async def restore(self, records: Records) -> None:
-        """Restore the alarms of the previous start; their causes count as present until a check clears them."""
+        """Restore the alarms of the previous start, and raise that of lost records.
+
+        Their causes count as present until a check clears them.
+        """
         self.alarms = Alarms.from_data(
             [
                 {
@@ -190,6 +193,7 @@ class AlarmManager:
         )
         self._present = {alarm.id for alarm in self.alarms.known.values() if alarm.state in CAUSED}
         self._publish_active()
+        self.report_lost_records(records.notices)
 
     async def store_changes(self, records: Records) -> None:
         """Store every change until cancelled; a change that could not be stored is tried again with the next one."""
