@@ -36,6 +36,7 @@ NO_PAGES = {
     "/fruit/{sequence}/picture.svg",
     "/history/image/{sha256}.png",
     "/history/{sequence}/step/{step}/stage/{place}.jpg",
+    "/alarms/{alarm}/part",
     "/change/part",
     "/change/{number}/part",
     "/maintenance/health/part",
