@@ -34,7 +34,7 @@ def of_records(records: Sequence[FullRecord], observer: Observer, deciding_mm: f
     Args:
         records: of that time.
         observer: with all that was shown.
-        deciding_mm: closing of the recipe's last limit.
+        deciding_mm: closing of the first limit that decides by itself.
     """
     # A trigger whose begin the interface missed was not accepted: the station closes it as NO_RESULT, which no PLC is
     # shown, and the PLC triggers again.

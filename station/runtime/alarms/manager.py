@@ -200,7 +200,7 @@ class AlarmManager:
         while True:
             await self._changed.wait()
             self._changed.clear()
-            entries = tuple(self._unsaved)
+            entries, self._unsaved = tuple(self._unsaved), []
             rows = tuple(
                 AlarmRow(
                     alarm.id,
@@ -217,8 +217,7 @@ class AlarmManager:
                 await records.save_alarms(rows, entries)
             except RecordsError as error:
                 log.warning("alarms are not remembered: %s", error)
-            else:
-                del self._unsaved[: len(entries)]
+                self._unsaved = [*entries, *self._unsaved][-_MOST_UNSAVED:]
 
     def _set(self, alarms: Alarms, alarm: AlarmId, change: str, detail: Message | None = None) -> bool:
         if alarms.get(alarm) == self.alarms.get(alarm):

@@ -10,6 +10,7 @@ from station.inspection.alarm_table import AlarmId
 from station.messages.message import verbatim
 from station.records import records as module
 from station.records.audit import AuditEntry
+from station.runtime.alarms import manager
 from station.runtime.alarms.manager import AlarmManager
 from station.runtime.observability import audit_logger
 from station.runtime.observability.audit_logger import AuditLogger
@@ -123,3 +124,27 @@ def test_an_alarm_that_outlasts_the_deadline_is_one_row_of_the_log(opened, scena
 
     scenario(steps)
     assert logged() == [AlarmId.DISK_LOW, AlarmId.HMI_LOST]
+
+
+def test_alarm_changes_beyond_the_most_that_wait_drop_the_oldest_alone(opened, scenario, folder, slow, monkeypatch):
+    monkeypatch.setattr(manager, "_MOST_UNSAVED", 2)
+
+    def logged():
+        return written(folder, "SELECT id FROM alarms_log ORDER BY row")
+
+    async def steps():
+        async with opened() as records:
+            begun, gate = slow("replace_alarms")
+            alarms = AlarmManager(Metrics("0", 15.0))
+            storing = asyncio.create_task(alarms.store_changes(records))
+            alarms.raise_(AlarmId.DISK_LOW, verbatim("2 GB left"))
+            await pass_deadline(begun)
+            for alarm in (AlarmId.HMI_LOST, AlarmId.OUTBOX_BEHIND, AlarmId.CAMERA_LOST):
+                alarms.raise_(alarm, verbatim("now"))
+            gate.set()
+            while AlarmId.CAMERA_LOST not in logged():
+                await asyncio.sleep(0.005)
+            await end(storing)
+
+    scenario(steps)
+    assert logged() == [AlarmId.DISK_LOW, AlarmId.OUTBOX_BEHIND, AlarmId.CAMERA_LOST]
