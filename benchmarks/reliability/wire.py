@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 
 from plc_interface.plc_simulator.program import LineProgram, Outputs, Passage, Stage, Values
 from plc_interface.plc_simulator.scan import Scanner
+from plc_interface.registers.alarms import active_alarms
 from plc_interface.registers.map import BY_NAME
 from station.inspection.alarm_table import ALARMS, AlarmId
 
@@ -188,9 +189,8 @@ class Wire:
         accepted = int(inputs["accepted_trigger_id"])
         if accepted and (not self.accepted or self.accepted[-1] != accepted):
             self.accepted.append(accepted)
-        for alarm, row in ALARMS.items():
-            if int(inputs["alarms"]) >> (row.number - 1) & 1:
-                self.alarms.add(alarm)
+        active = active_alarms(inputs)
+        self.alarms |= {alarm for alarm, row in ALARMS.items() if row.number in active}
         sequence = int(inputs["result_sequence"])
         if self.result_valid and sequence and sequence == inputs["result_sequence_again"]:
             reasons = BY_NAME["result_reasons"].names(int(inputs["result_reasons"]))
