@@ -201,11 +201,15 @@ class ArmLink:
                 try:
                     await self._play()
                 except ArmFault as fault:
-                    self._set(fault)
                     anew = fault.cause in SELF_HEALING or fault.cause is ArmCause.PROGRAM_STOPPED
+                    last = not anew or attempt == UPLOAD_TRIES - 1
+                    # What the next attempt may end is not reported: a reset that waits for this upload would take it
+                    # for a new stop, which waits for a person.
+                    if last or self.fault is None:
+                        self._set(fault)
                     if anew:
                         await self._drop()
-                    if not anew or attempt == UPLOAD_TRIES - 1:
+                    if last:
                         raise
                 else:
                     return

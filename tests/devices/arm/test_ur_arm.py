@@ -1,6 +1,7 @@
 """The driver against the emulated controller, over the wire, with the real ur-rtde."""
 
 import asyncio
+import logging
 import os
 import signal
 import subprocess
@@ -339,7 +340,9 @@ def test_a_slow_arm_goes_on_at_a_fraction_of_its_speed(healthy_arm, until):
     asyncio.run(run())
 
 
-def test_local_control_is_named_and_the_program_comes_back_after_it(healthy_arm, until):
+def test_local_control_is_named_and_the_program_comes_back_after_it(healthy_arm, until, caplog):
+    caplog.set_level(logging.INFO, "station.devices.arm.link")
+
     async def run():
         async with healthy_arm() as (bench, arm):
             bench.faults.set("local_mode")
@@ -349,8 +352,10 @@ def test_local_control_is_named_and_the_program_comes_back_after_it(healthy_arm,
             assert await cause_of(arm.confirm_protective_stop()) is ArmCause.LOCAL_CONTROL
             bench.faults.clear("local_mode")
             await until(lambda: bench.controller.safety.remote)
+            caplog.clear()
             # The script connection was dropped: ur-rtde's reuploadScript says True, and nothing plays.
             await arm.upload_again()
+            assert caplog.messages == ["arm link: ready"], "the first attempt's failure is no other fault"
             await arm.move_to("accept")
 
     asyncio.run(run())
