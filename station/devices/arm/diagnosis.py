@@ -67,6 +67,6 @@ def from_output(output: Message | None) -> ArmFault | None:
         return ArmFault(ArmCause.LOCAL_CONTROL, messages.LOCAL_CONTROL())
     if "already in use" in lowered:
         return ArmFault(ArmCause.REGISTERS_IN_USE, messages.REGISTERS_IN_USE())
-    if "could not connect" in lowered or "timeout connecting" in lowered:
+    if any(words in lowered for words in ("could not connect", "timeout connecting", "end of file")):
         return ArmFault(ArmCause.LINK_LOST, messages.CONNECTION_FAILED(reason=output))
     return None

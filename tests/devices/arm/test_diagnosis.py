@@ -72,6 +72,7 @@ def test_what_was_not_done_has_one_cause(state, remote, healthy, cause):
         ("One of the RTDE input registers are already in use! Currently you must …", ArmCause.REGISTERS_IN_USE),
         ("Error: Could not connect to: 127.0.0.2 at 30004, verify the IP", ArmCause.LINK_LOST),
         ("Timeout connecting to UR dashboard server.", ArmCause.LINK_LOST),
+        ("End of file", ArmCause.LINK_LOST),  # Boost.Asio's, of a connection that was cut in the constructor
         ("ur_rtde: Failed to start control script, before timeout of 5 seconds", None),
     ],
 )
