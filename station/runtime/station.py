@@ -42,10 +42,10 @@ from station.runtime.recipes.active import ActiveRecipes
 from station.runtime.rpc.operator import PanelServer
 from station.runtime.rpc.pages import PanelPages
 from station.runtime.rpc.plc import PlcInterfaceServer
-from station.runtime.state_files import StateFiles
 from station.settings.configuration import Configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
+from station.state_files import StateFiles
 from station.supervision.notify import extended_start, feed_watchdog, notify
 
 log = logging.getLogger(__name__)

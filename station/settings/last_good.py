@@ -9,10 +9,10 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from station.atomic_file import write_atomically
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.environment import CONFIG_VARIABLE, variable
 from station.settings.problems import SettingsError
+from station.state_files import StateFiles
 
 _FOLDER = "last_good"
 
@@ -43,7 +43,7 @@ def load_or_last_good(file: Path | None, environ: Mapping[str, str] | None = Non
             raise
         log.warning("%s; the last good configuration is used", error)
         return last_good, str(error)
-    _store(configuration.home / _name(file, environ), configuration.model_dump_json().encode())
+    StateFiles(configuration.home).write(_name(file, environ), configuration.model_dump_json().encode())
     return configuration, ""
 
 
@@ -53,17 +53,6 @@ def read_last_good(file: Path | None, environ: Mapping[str, str]) -> Configurati
         with contextlib.suppress(OSError, ValidationError):
             return Configuration.model_validate_json((home / _name(file, environ)).read_bytes())
     return None
-
-
-def _store(path: Path, data: bytes) -> None:
-    """Store a good configuration; a home folder that cannot be written stops no process."""
-    try:
-        if path.is_file() and path.read_bytes() == data:
-            return
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, data, 0o600)
-    except OSError as error:
-        log.warning("%s cannot be written: %s", path, error.strerror)
 
 
 def _name(file: Path | None, environ: Mapping[str, str]) -> str:

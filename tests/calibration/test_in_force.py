@@ -33,11 +33,11 @@ from station.records.database import reading, records_folder
 from station.records.queries import read_inspection
 from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.imaging.golden_reference import GoldenReference
-from station.runtime.state_files import StateFiles
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
 from station.settings.segmentation import Segmentation
+from station.state_files import StateFiles
 
 LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
 FAILED = Check(

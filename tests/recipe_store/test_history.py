@@ -15,9 +15,9 @@ from station.messages import recipes
 from station.recipe_store.revision import RecipeStoreError
 from station.records.model import RecipeSnapshot
 from station.runtime.recipes.active import ActiveRecipes
-from station.runtime.state_files import StateFiles
 from station.settings.recipe import APPROVED_NAME, approved_list, load_recipe, shipped_folder
 from station.settings.recipe_versions import canonical_text, content_sha256
+from station.state_files import StateFiles
 
 LIMIT = "damage.area[0].area_mm2"
 

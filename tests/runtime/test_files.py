@@ -8,9 +8,9 @@ import pytest
 
 from station.records import open as opening
 from station.runtime.recipes.active import ActiveRecipe, ActiveRecipes
-from station.runtime.state_files import StateFiles
 from station.settings.last_good import load_or_last_good
 from station.settings.problems import SettingsError
+from station.state_files import StateFiles
 
 
 def test_a_broken_configuration_is_replaced_by_its_last_good_form(settings_file, tmp_path):

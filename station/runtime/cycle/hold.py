@@ -5,7 +5,7 @@ import logging
 
 from station.inspection.cycle import LATCHES, Event, hold_after
 from station.inspection.states import State
-from station.runtime.state_files import StateFiles
+from station.state_files import StateFiles
 
 FILE_NAME = "held_for_a_person"
 _NONE = b"no"

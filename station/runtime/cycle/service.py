@@ -29,8 +29,8 @@ from station.runtime.cycle.runner import CycleRunner, Happened, Work, event_of
 from station.runtime.devices.manager import DeviceManager
 from station.runtime.observability.observability import Observability
 from station.runtime.recipes.active import ActiveRecipe
-from station.runtime.state_files import StateFiles
 from station.settings.configuration import Configuration
+from station.state_files import StateFiles
 from station.vocabulary import Refusal
 
 CYCLE = "cycle"

@@ -10,8 +10,8 @@ from station.devices.camera.interface import Image
 from station.messages import grip as messages
 from station.messages.message import Message
 from station.press.reference import PreparedReference
-from station.runtime.state_files import StateFiles
 from station.settings.segmentation import Segmentation
+from station.state_files import StateFiles
 from station.vision.image_quality import light, sharpness
 from station.vision.methods import make_method
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from station.records.audit import STATION, AuditEntry
-from station.runtime.state_files import StateFiles
 from station.settings.configuration import Configuration
+from station.state_files import StateFiles
 
 _LAST = "audited_configuration.json"
 _KEY = "audited_configuration.key"

@@ -23,7 +23,7 @@ from station.runtime.observability.audit_logger import PANEL, PLC, AlarmChange, 
 from station.runtime.observability.observability import Observability
 from station.runtime.production.lots import LotManager
 from station.runtime.recipes.active import ActiveRecipes
-from station.runtime.state_files import StateFiles
+from station.state_files import StateFiles
 from station.vocabulary import Refusal
 
 log = logging.getLogger(__name__)

@@ -18,10 +18,10 @@ from station.recipe_store.store import RecipeStore
 from station.records.audit import STATION, AuditEntry
 from station.records.errors import RecordsError
 from station.records.model import RecipeSnapshot
-from station.runtime.state_files import StateFiles
 from station.settings.problems import SettingsError
 from station.settings.recipe import Recipe
 from station.settings.recipe_versions import content_sha256
+from station.state_files import StateFiles
 
 _ACTIVE = "active_recipe.json"
 _CONTROLS = "control_recipes"

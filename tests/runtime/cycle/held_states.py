@@ -15,7 +15,7 @@ from station.inspection.cycle import Event
 from station.inspection.states import State
 from station.runtime.cycle.hold import Hold
 from station.runtime.cycle.runner import CycleRunner
-from station.runtime.state_files import StateFiles
+from station.state_files import StateFiles
 
 E, S = Event, State
 TO_IDLE = (

@@ -6,9 +6,9 @@ import pytest
 from station.inspection.alarm_table import AlarmId
 from station.press.reference import BadReferenceError, check_reference
 from station.runtime.imaging.golden_reference import GoldenReference
-from station.runtime.state_files import StateFiles
 from station.settings.recipe import find_recipe
 from station.settings.service import ReferenceSettings
+from station.state_files import StateFiles
 from station.twin.digit.sensor import Condition, DigitSensor
 from station.vision.median import median_image
 

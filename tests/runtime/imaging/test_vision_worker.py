@@ -11,9 +11,9 @@ from station.press.rig import Position, Step
 from station.runtime.imaging import worker as module
 from station.runtime.imaging.golden_reference import GoldenReference
 from station.runtime.imaging.worker import VisionWorker
-from station.runtime.state_files import StateFiles
 from station.settings.recipe import find_recipe
 from station.settings.service import ReferenceSettings
+from station.state_files import StateFiles
 from station.vision.methods import make_method
 from station.vision.press import PressTracker
 from station.vision.step import measure_step

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from station.runtime.observability.startup_audit import start_entries
-from station.runtime.state_files import StateFiles
+from station.state_files import StateFiles
 
 
 def test_a_secret_is_audited_by_a_keyed_hash(tmp_path):

@@ -14,7 +14,7 @@ from station.messages.commands import JOGGING
 from station.messages.maintenance import UNDER_WAY
 from station.runtime.devices.manager import CAMERA, GRIPPER
 from station.runtime.production.plc_commands import MANUAL
-from station.runtime.state_files import StateFiles
+from station.state_files import StateFiles
 from tests.runtime.ball import MAX, end_run, give, run_now, start_run, stop, until_waits
 
 

@@ -13,7 +13,7 @@ from station.runtime.devices.manager import GRIPPER
 from station.runtime.production import plc_commands
 from station.runtime.production.housekeeping import Housekeeping
 from station.runtime.production.plc_commands import MANUAL, PRODUCTION
-from station.runtime.state_files import StateFiles
+from station.state_files import StateFiles
 
 
 @pytest.fixture
