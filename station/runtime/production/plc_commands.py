@@ -116,9 +116,8 @@ class PlcCommands:
         if age_s > LINE_SILENT_S:
             return operation.INTERFACE_SILENT(age_s=age_s)
         report = self.last_report
-        expected = report.enabled or report.enable_withdrawn
-        if report.plc_alive or not expected:
-            return None
+        if report.plc_alive or not report.enable_withdrawn:
+            return None  # one that is enabled and has not beaten yet, or never beats, is served and not monitored
         return operation.HEARTBEAT_STILL() if report.plc_connected else operation.PLC_GONE()
 
     def update_line_alarms(self) -> None:

@@ -5,8 +5,12 @@ import json
 import urllib.error
 import urllib.request
 
+import pytest
+
 from plc_interface.client import StationClient
+from station.channel.line import CommandName, Line, StationState
 from station.inspection.alarm_table import ALARMS, AlarmId
+from station.runtime.production import housekeeping
 
 NUMBER = ALARMS[AlarmId.PLC_HEARTBEAT_LOST].number
 BEATS = 10
@@ -21,6 +25,29 @@ def plc_health(port):
         answer = error
     with answer:
         return next(part for part in json.load(answer)["dependencies"] if part["name"] == "plc")["state"]
+
+
+@pytest.mark.parametrize("connected", [True, False])
+def test_a_plc_is_missed_once_its_enable_was_withdrawn_and_not_before_its_first_beat(bench, monkeypatch, connected):
+    monkeypatch.setattr(housekeeping, "_RECIPE_WITHIN_S", 0.5)
+
+    async def scenario():
+        async with bench() as cell:
+
+            async def until(alarm, **values):
+                line = Line(plc_connected=connected, plc_alive=False, waiting=0, counters={}, faults=(), **values)
+                async with asyncio.timeout(60):
+                    while True:
+                        word = (await cell.line.client.request(line, StationState, deadline_s=20)).alarms
+                        if word & 1 << ALARMS[alarm].number - 1:
+                            return bool(word & 1 << NUMBER - 1)
+                        await asyncio.sleep(0.05)
+
+            await cell.line.order(CommandName.RESET)
+            assert not await until(AlarmId.NO_RECIPE, enabled=True), "the enabled line was evaluated, and is not missed"
+            assert await until(AlarmId.PLC_HEARTBEAT_LOST, enabled=False, enable_withdrawn=True)
+
+    asyncio.run(scenario())
 
 
 def test_a_plc_that_goes_while_it_is_enabled_is_an_alarm_until_it_beats_again(bench, plc_port, settings_file):
