@@ -76,6 +76,7 @@ PROGRAM_STOPPED = define("arm.program_stopped", "the control program was stopped
 PROGRAM_STOPPED_BECAUSE = define(
     "arm.program_stopped_because", "the control program was stopped on the controller ({reason})", reason=Nested()
 )
+PROGRAM_NOT_BEGUN = define("arm.program_not_begun", "the control program did not begin to play")
 COMMAND_NOT_TAKEN = define("arm.command_not_taken", "the control program plays and did not take the command")
 COMMAND_NOT_TAKEN_BECAUSE = define(
     "arm.command_not_taken_because",

@@ -37,6 +37,8 @@ BEAT_DEADLINE_S = 1.0
 FIRST_PAUSE_S = 0.2
 LONGEST_PAUSE_S = 3.0
 UPLOAD_TRIES = 3
+BEGIN_TRIES = 3
+"""Of a program that does not begin to play, before a person is called: a link that is cut meanwhile has this too."""
 SETTLE_S = 0.5
 FIRST_LEASE_S = 2.0
 END_AGAIN_S = 1.0
@@ -58,6 +60,7 @@ class ArmLink:
         self._failures = 0
         self._healthy_until_s = 0.0
         self._was_healthy = True
+        self._played, self._tries_left = False, BEGIN_TRIES
         self._end_again_s = 0.0
         self._lock = asyncio.Lock()
         self._maintaining: asyncio.Task[None] | None = None
@@ -222,6 +225,7 @@ class ArmLink:
             if self.fault is not None:
                 raise self.fault.again()
         elif snapshot.runtime_state != PLAYING:
+            self._played = False
             done = await process.request(Upload(), Outcome, deadline_s=self._settings.constructor_limit_s)
             if not done.done:
                 raise await self._explain(done.output)
@@ -279,6 +283,8 @@ class ArmLink:
             # The lapse was shorter than the watchdog's limit: it does not explain a stop from now on. A stop by the
             # watchdog that this state is too old to show has late kicks; without them a person has to check.
             self._was_healthy = True
+        if snapshot.runtime_state == PLAYING:
+            self._played, self._tries_left = True, BEGIN_TRIES
         seen = from_state(snapshot)
         latched = self._latched.cause if self._latched is not None else None
         if seen is not None and seen.cause is not latched:
@@ -325,6 +331,7 @@ class ArmLink:
             payload_centre_mm=settings.payload_centre_mm,
             watchdog_hz=settings.watchdog_hz,
         )
+        self._played = False
         outcome = await process.request(request, Outcome, deadline_s=settings.constructor_limit_s)
         if not outcome.done:
             self._store_or_raise(await self._explain(outcome.output))
@@ -343,7 +350,14 @@ class ArmLink:
         async with dashboard(self._settings.host) as conversation:
             facts = await conversation.facts()
         snapshot = await self._process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
-        return diagnose(snapshot, facts, output, was_healthy=self._was_healthy and not snapshot.kicks_late)
+        fault = diagnose(snapshot, facts, output, was_healthy=self._was_healthy and not snapshot.kicks_late)
+        stopped, before = fault.cause is ArmCause.PROGRAM_STOPPED, self._latched
+        if stopped and before is None and not self._played and self._tries_left > 1:
+            # Nobody stops a program that was never seen to play: the link was cut while it was started, or this state
+            # is of before. After a stop that a person has to check, nothing is started here.
+            self._tries_left -= 1
+            return ArmFault(ArmCause.LINK_LOST, messages.PROGRAM_NOT_BEGUN())
+        return fault
 
     async def explain(self, output: Message | None) -> ArmFault:
         """Return why a command was not done, with its output if it gave one; it becomes the link's fault."""

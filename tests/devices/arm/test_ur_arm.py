@@ -503,6 +503,66 @@ def test_a_link_that_comes_and_goes_is_put_back(healthy_arm, until):
     asyncio.run(run())
 
 
+ALWAYS = 1000
+
+
+@pytest.mark.parametrize("ended", [1, 2, ALWAYS])
+def test_a_program_that_ends_as_it_begins_is_started_again_and_then_left_to_a_person(bench, healthy, until, ended):
+    """As a link does that is cut while ur-rtde starts the program, which nobody has stopped then."""
+
+    async def run():
+        async with bench() as made:
+            script, began, left = made.controller.script, None, ended
+            step = script.step
+
+            def end_soon(now_s):
+                nonlocal began, left
+                step(now_s)
+                if script.runtime_state is not RuntimeState.PLAYING:
+                    began = None
+                elif left:
+                    began = began or now_s
+                    if now_s - began > 0.03:
+                        left -= 1
+                        script.end("the link was cut")
+
+            script.step = end_soon
+            async with UrArm(made.settings()) as arm, healthy(arm):
+                if ended != ALWAYS:
+                    await until(lambda: not left and script.runtime_state is RuntimeState.PLAYING, 60.0)
+                    await arm.ready(60.0)
+                    await arm.move_to("accept")
+                else:
+                    await until(lambda: has_cause(arm, ArmCause.PROGRAM_STOPPED), 60.0)
+                    assert ended - left == 3
+                    left = 0
+                    await asyncio.sleep(0.5)
+                    assert script.runtime_state is RuntimeState.STOPPED
+                    await arm.upload_again()
+                    await arm.move_to("accept")
+
+    asyncio.run(run())
+
+
+def test_a_station_that_starts_in_an_emergency_stop_starts_no_program_once_it_is_released(bench, healthy, until):
+    async def run():
+        async with bench() as made:
+            made.faults.set("emergency_stop")
+            async with UrArm(made.settings()) as arm, healthy(arm):
+                await until(lambda: has_cause(arm, ArmCause.EMERGENCY_STOP), 60.0)
+                process = arm.process_id
+                made.faults.clear("emergency_stop")
+                await until(lambda: has_cause(arm, ArmCause.NOT_POWERED), 60.0)
+                for command in ("power on", "brake release"):
+                    made.controller.answer(command)
+                await until(lambda: has_cause(arm, ArmCause.PROGRAM_STOPPED), 60.0)
+                await asyncio.sleep(0.5)
+                assert made.controller.script.runtime_state is RuntimeState.STOPPED
+                assert arm.process_id == process, "the link is well: nothing is connected anew"
+
+    asyncio.run(run())
+
+
 def test_a_stream_frozen_too_long_counts_as_a_lost_link(healthy_arm, until):
     """ur-rtde says that it is connected all the while."""
 
