@@ -92,6 +92,7 @@ NOT_CONNECTED_BECAUSE = define("arm.not_connected_because", "the arm is not conn
 CONNECTION_FAILED = define("arm.connection_failed", "ur-rtde could not connect: {reason}", reason=Nested())
 NOTHING_RECEIVED = define("arm.nothing_received", "ur-rtde receives nothing: {reason}", reason=Nested())
 NO_REASON = define("arm.no_reason", "no reason given")
+LINK_CUT = define("arm.link_cut", "the controller closed the connection")
 STATE_OLD = define("arm.state_old", "the controller's state is {age_s} s old", age_s=Number(2))
 STATE_LATE = define("arm.state_late", "the arm's process reported no state within {limit_s} s")
 STATE_NOT_RECEIVED = define("arm.state_not_received", "the controller's state is not received yet")

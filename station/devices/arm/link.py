@@ -36,10 +36,9 @@ BEAT_S = 0.1
 BEAT_DEADLINE_S = 1.0
 FIRST_PAUSE_S = 0.2
 LONGEST_PAUSE_S = 3.0
-UPLOAD_TRIES = 3
-BEGIN_TRIES = 3
-"""Of a program that does not begin to play, before a person is called: a link that is cut meanwhile has this too."""
+UPLOAD_TRIES = BEGIN_TRIES = 3
 SETTLE_S = 0.5
+POLL_S = 0.01
 FIRST_LEASE_S = 2.0
 END_AGAIN_S = 1.0
 PROCESS_START_LIMIT_S = 60.0
@@ -60,7 +59,7 @@ class ArmLink:
         self._failures = 0
         self._healthy_until_s = 0.0
         self._was_healthy = True
-        self._played, self._tries_left = False, BEGIN_TRIES
+        self._tries_left = BEGIN_TRIES
         self._end_again_s = 0.0
         self._lock = asyncio.Lock()
         self._maintaining: asyncio.Task[None] | None = None
@@ -136,7 +135,7 @@ class ArmLink:
             raise (self.fault or ArmFault(ArmCause.LINK_LOST, messages.NOT_CONNECTED())).again()
         limit_s, begun_s = self._settings.stale_after_s, time.monotonic()
         try:
-            snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=limit_s)
+            snapshot = await self._state(process, limit_s)
         except ArmFault as fault:
             if fault.cause is ArmCause.DEADLINE:
                 raise ArmFault(ArmCause.STALE, messages.STATE_LATE(limit_s=limit_s)) from fault
@@ -186,8 +185,15 @@ class ArmLink:
             await asyncio.sleep(BEAT_S)
             await self._heard(process)
 
+    async def _state(self, process: ArmProcess, deadline_s: float) -> Snapshot:
+        """Read the state, whatever its age; ur-rtde has a last one also of a connection that is cut."""
+        snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=deadline_s)
+        if not snapshot.connected:
+            raise ArmFault(ArmCause.LINK_LOST, messages.LINK_CUT())
+        return snapshot
+
     async def _heard(self, process: ArmProcess) -> Snapshot:
-        snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+        snapshot = await self._state(process, BEAT_DEADLINE_S)
         if snapshot.age_s > self._settings.link_lost_after_s:
             raise ArmFault(ArmCause.LINK_LOST, messages.STATE_OLD(age_s=snapshot.age_s))
         return snapshot
@@ -225,9 +231,8 @@ class ArmLink:
             if self.fault is not None:
                 raise self.fault.again()
         elif snapshot.runtime_state != PLAYING:
-            self._played = False
             done = await process.request(Upload(), Outcome, deadline_s=self._settings.constructor_limit_s)
-            if not done.done:
+            if not (done.done and await self._plays(process)):
                 raise await self._explain(done.output)
             self._up()
         else:
@@ -237,7 +242,7 @@ class ArmLink:
         # The RTDE state may lag a little behind the dashboard server's reply.
         deadline_s = time.monotonic() + SETTLE_S
         while True:
-            snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+            snapshot = await self._state(process, BEAT_DEADLINE_S)
             fault = from_state(snapshot)
             if fault is None:
                 return snapshot
@@ -267,7 +272,7 @@ class ArmLink:
             await self._watch(self._process)
         else:
             process = await self._connect()
-            snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+            snapshot = await self._state(process, BEAT_DEADLINE_S)
             fault = from_state(snapshot) or self._latched
             if fault is None:
                 await self._command(process)
@@ -283,8 +288,6 @@ class ArmLink:
             # The lapse was shorter than the watchdog's limit: it does not explain a stop from now on. A stop by the
             # watchdog that this state is too old to show has late kicks; without them a person has to check.
             self._was_healthy = True
-        if snapshot.runtime_state == PLAYING:
-            self._played, self._tries_left = True, BEGIN_TRIES
         seen = from_state(snapshot)
         latched = self._latched.cause if self._latched is not None else None
         if seen is not None and seen.cause is not latched:
@@ -331,16 +334,28 @@ class ArmLink:
             payload_centre_mm=settings.payload_centre_mm,
             watchdog_hz=settings.watchdog_hz,
         )
-        self._played = False
         outcome = await process.request(request, Outcome, deadline_s=settings.constructor_limit_s)
-        if not outcome.done:
-            self._store_or_raise(await self._explain(outcome.output))
-        else:
-            # The lease that the process knew may have run out while the connection was made: renew it before the
-            # watchdog that has just been set up expects a kick. The next beat checks whether it answers.
-            with contextlib.suppress(ArmFault):
-                await process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
+        # The lease that the process knew may have run out while the connection was made: the beats in this renew it
+        # before the watchdog that has just been set up expects a kick.
+        if outcome.done and await self._plays(process):
             self._up()
+            return
+        fault = await self._explain(outcome.output)
+        if fault.cause is ArmCause.PROGRAM_STOPPED and self._tries_left > 1:
+            # Nobody stops a program that was never seen to play: rather the link was cut while it was started.
+            self._tries_left -= 1
+            raise ArmFault(ArmCause.LINK_LOST, messages.PROGRAM_NOT_BEGUN())
+        self._store_or_raise(fault)
+
+    async def _plays(self, process: ArmProcess) -> bool:
+        """Whether the program that was just started plays, by a state that is newer than its start."""
+        began_s = time.monotonic()
+        while time.monotonic() < began_s + SETTLE_S:
+            snapshot = await self._heard(process)
+            if snapshot.runtime_state == PLAYING and time.monotonic() - snapshot.age_s > began_s:
+                return True
+            await asyncio.sleep(POLL_S)
+        return False
 
     async def _explain(self, output: Message | None) -> ArmFault:
         fault = from_output(output)
@@ -349,15 +364,8 @@ class ArmLink:
             return fault or ArmFault(ArmCause.LINK_LOST, away)
         async with dashboard(self._settings.host) as conversation:
             facts = await conversation.facts()
-        snapshot = await self._process.request(self._beat_message(), Snapshot, deadline_s=BEAT_DEADLINE_S)
-        fault = diagnose(snapshot, facts, output, was_healthy=self._was_healthy and not snapshot.kicks_late)
-        stopped, before = fault.cause is ArmCause.PROGRAM_STOPPED, self._latched
-        if stopped and before is None and not self._played and self._tries_left > 1:
-            # Nobody stops a program that was never seen to play: the link was cut while it was started, or this state
-            # is of before. After a stop that a person has to check, nothing is started here.
-            self._tries_left -= 1
-            return ArmFault(ArmCause.LINK_LOST, messages.PROGRAM_NOT_BEGUN())
-        return fault
+        snapshot = await self._state(self._process, BEAT_DEADLINE_S)
+        return diagnose(snapshot, facts, output, was_healthy=self._was_healthy and not snapshot.kicks_late)
 
     async def explain(self, output: Message | None) -> ArmFault:
         """Return why a command was not done, with its output if it gave one; it becomes the link's fault."""
@@ -380,7 +388,7 @@ class ArmLink:
         return Beat(healthy_for_s=max(0.0, self._healthy_until_s - time.monotonic()))
 
     def _up(self) -> None:
-        self._failures = 0
+        self._failures, self._tries_left = 0, BEGIN_TRIES
         self._was_healthy = self.healthy
         self.attachment += 1
         self._set(None)

@@ -110,5 +110,7 @@ class Snapshot(ChannelMessage):
     """Whether the commanding connection is up."""
     underway: bool
     """Whether the control program reports a motion."""
+    connected: bool = True
+    """Whether the controller has not closed the receiving connection."""
     kicks_late: bool = False
     """Whether the controller's watchdog was not kicked within its limit since the program began."""

@@ -99,6 +99,9 @@ class UrRtdeProcess:
         age_s = self._age.age_s(receive.getTimestamp(), time.monotonic())
         progress = self._control.getAsyncOperationProgressEx() if self._control is not None else None
         return Snapshot(
+            # Of the receiving connection: the commanding one's tells nothing while ur-rtde reconnects that by itself,
+            # which stops the program and often ends this process.
+            connected=receive.isConnected(),
             age_s=age_s,
             joints_rad=tuple(receive.getActualQ()),
             speeds_rad_s=tuple(receive.getActualQd()),

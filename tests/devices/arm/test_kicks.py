@@ -44,6 +44,7 @@ class Controller:
     def __getattr__(self, name):
         return {
             "getTimestamp": time.monotonic,
+            "isConnected": lambda: True,
             "getRobotMode": lambda: 7,
             "getSafetyStatusBits": lambda: 1,
         }.get(name, lambda: [0.0] * 6)

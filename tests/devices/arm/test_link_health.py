@@ -9,7 +9,7 @@ import pytest
 from station.devices.arm import link
 from station.devices.arm.dashboard import DashboardFacts
 from station.devices.arm.diagnosis import PLAYING
-from station.devices.arm.faults import ArmCause
+from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.messages import Snapshot
 from station.settings.arm import ArmSettings
 
@@ -20,7 +20,7 @@ STOPPED = PLAYING - 1
 class Process:
     """The ur-rtde process of a powered arm in remote control."""
 
-    state, kicks_late, safety_bits = PLAYING, False, 1
+    state, kicks_late, safety_bits, connected = PLAYING, False, 1, True
 
     async def request(self, _request, _reply, *, deadline_s):
         return Snapshot(
@@ -32,6 +32,7 @@ class Process:
             runtime_state=self.state,
             commanding=True,
             underway=False,
+            connected=self.connected,
             kicks_late=self.kicks_late,
         )
 
@@ -101,6 +102,28 @@ WELL, LAPSE = (True, PLAYING, False), (False, PLAYING, False)
 )
 def test_a_stop_is_the_watchdogs_only_where_it_was_left_without_kicks(cause_after, beats, cause):
     assert cause_after(*beats) is cause
+
+
+@pytest.mark.usefixtures("dashboard_requests")
+@pytest.mark.parametrize("state", [PLAYING, STOPPED])
+def test_a_connection_that_the_controller_closed_is_lost_whatever_was_received_last(state):
+    """ur-rtde stops the program where it connects again by itself: that was nobody on the pendant."""
+
+    async def scenario():
+        process: Any = Process()
+        arm = link.ArmLink(ArmSettings())
+        arm._process = process
+        arm.renew_health(60.0)
+        arm._up()
+        process.state, process.connected = state, False
+        with pytest.raises(ArmFault) as watched:
+            await arm._watch(process)
+        with pytest.raises(ArmFault) as read:
+            await arm.snapshot()
+        assert watched.value.cause is read.value.cause is ArmCause.LINK_LOST
+        assert arm.lost is read.value
+
+    asyncio.run(scenario())
 
 
 PAUSED, RESUMING = 4, 5

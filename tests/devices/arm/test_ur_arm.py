@@ -15,7 +15,8 @@ import pytest
 
 from station.devices.arm.arm import ArmState
 from station.devices.arm.faults import REMEDIES, ArmCause, ArmFault
-from station.devices.arm.messages import Move, Reachable
+from station.devices.arm.messages import Beat, Move, Outcome, Reachable, Snapshot, Start, Watch
+from station.devices.arm.process_handle import ArmProcess
 from station.devices.arm.ur import UrArm
 from station.messages import arm as messages
 from station.settings.arm import ArmPoses, ArmSettings
@@ -512,21 +513,18 @@ def test_a_program_that_ends_as_it_begins_is_started_again_and_then_left_to_a_pe
 
     async def run():
         async with bench() as made:
-            script, began, left = made.controller.script, None, ended
-            step = script.step
+            script, left = made.controller.script, ended
+            begin = script._begin
 
-            def end_soon(now_s):
-                nonlocal began, left
-                step(now_s)
-                if script.runtime_state is not RuntimeState.PLAYING:
-                    began = None
-                elif left:
-                    began = began or now_s
-                    if now_s - began > 0.03:
-                        left -= 1
-                        script.end("the link was cut")
+            def end_or_begin(command):
+                nonlocal left
+                if not left:
+                    begin(command)
+                    return
+                left -= 1
+                script.end("the link was cut")
 
-            script.step = end_soon
+            script._begin = end_or_begin
             async with UrArm(made.settings()) as arm, healthy(arm):
                 if ended != ALWAYS:
                     await until(lambda: not left and script.runtime_state is RuntimeState.PLAYING, 60.0)
@@ -540,6 +538,30 @@ def test_a_program_that_ends_as_it_begins_is_started_again_and_then_left_to_a_pe
                     assert script.runtime_state is RuntimeState.STOPPED
                     await arm.upload_again()
                     await arm.move_to("accept")
+
+    asyncio.run(run())
+
+
+def test_a_connection_that_the_controller_closes_is_told_by_the_process_with_its_next_state(bench, until):
+    async def run():
+        async with bench() as made:
+            process = await ArmProcess.spawn(made.host, 125.0)
+            try:
+                for request in (Start(), Watch()):
+                    assert (await process.request(request, Outcome, deadline_s=60.0)).done
+
+                async def connected():
+                    return (await process.request(Beat(healthy_for_s=0.0), Snapshot, deadline_s=60.0)).connected
+
+                assert await connected()
+                made.faults.set("link_cut")
+
+                async def cut():
+                    return not await connected()
+
+                await until(cut)
+            finally:
+                await process.end()
 
     asyncio.run(run())
 
