@@ -9,7 +9,7 @@ from functools import partial
 from station.channel.line import Begin, BeginReply, Outcome
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
-from station.inspection.cycle import ACCEPTING, REASONS, UNJUDGED, Action, Event, Raise
+from station.inspection.cycle import ACCEPTING, PLACING, REASONS, UNJUDGED, Action, Event, Raise
 from station.inspection.states import STATES, State
 from station.messages import operation as messages
 from station.messages.message import Message, message_of
@@ -53,8 +53,8 @@ class Service:
         self._resolution_mm = configuration.gripper.calibration.mm_per_count
         self._devices, self._inspector = devices, inspector
         self.alarms, self._metrics, self._liveness = alarms, observability.metrics, observability.liveness
-        carries = self._settings.placing == "arm" and not self._settings.bench
-        self._hold = Hold(StateFiles(configuration.home), carries=carries)
+        self._carries = self._settings.placing == "arm" and not self._settings.bench
+        self._hold = Hold(StateFiles(configuration.home), carries=self._carries)
         self.runner = CycleRunner(self, self._hold.event)
         self.triggers = RecentTriggers()
         self.registry = InspectionRegistry(records, self.triggers, devices, observability.versions)
@@ -289,8 +289,12 @@ class Service:
 
     def device_changed(self, fault: StationError | None) -> None:
         """Handle a monitor's report that a device has another fault from now on, or none."""
-        if fault is not None:
-            self.runner.post(event_of(fault), message_of(fault))
+        if fault is None:
+            return
+        event = event_of(fault)
+        if event is Event.ARM_FAULT and self.state in PLACING and not self._carries:
+            return  # the jaws let the fruit go where the arm stands; its way home meets the fault
+        self.runner.post(event, message_of(fault))
 
     # The actions.
 

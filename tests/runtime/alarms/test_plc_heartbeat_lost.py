@@ -13,6 +13,7 @@ from station.inspection.alarm_table import ALARMS, AlarmId
 from station.runtime.production import housekeeping
 
 NUMBER = ALARMS[AlarmId.PLC_HEARTBEAT_LOST].number
+AGE = 'station_link_age_seconds{link="plc"}'
 BEATS = 10
 """Of the station, in which it has evaluated its alarms anew."""
 
@@ -25,6 +26,13 @@ def plc_health(port):
         answer = error
     with answer:
         return next(part for part in json.load(answer)["dependencies"] if part["name"] == "plc")["state"]
+
+
+def plc_age_s(port):
+    """Time since the PLC was heard, as an alert reads it."""
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=20) as page:
+        [line] = [each for each in page.read().decode().splitlines() if each.startswith(AGE)]
+    return float(line.split()[-1])
 
 
 @pytest.mark.parametrize("connected", [True, False])
@@ -44,7 +52,9 @@ def test_a_plc_is_missed_once_its_enable_was_withdrawn_and_not_before_its_first_
                         await asyncio.sleep(0.05)
 
             await cell.line.order(CommandName.RESET)
+            unheard_s = await asyncio.to_thread(plc_age_s, cell.configuration.metrics.port)
             assert not await until(AlarmId.NO_RECIPE, enabled=True), "the enabled line was evaluated, and is not missed"
+            assert await asyncio.to_thread(plc_age_s, cell.configuration.metrics.port) < unheard_s
             assert await until(AlarmId.PLC_HEARTBEAT_LOST, enabled=False, enable_withdrawn=True)
 
     asyncio.run(scenario())

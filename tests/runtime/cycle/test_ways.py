@@ -69,6 +69,33 @@ def test_a_fruit_whose_outcome_came_too_late_for_the_plc_is_carried_to_reject(be
 
 
 @pytest.mark.timeout(240)
+def test_fruit_that_is_let_go_in_the_nest_needs_no_person_where_the_arm_fails_meanwhile(bench):
+    lost = ArmFault(ArmCause.LINK_LOST, arm_messages.LINK_CUT())
+
+    async def scenario():
+        async with bench(bench=False) as cell:
+            assert (await cell.line.order(CommandName.CHANGE_RECIPE, 2)).done
+            await cell.until(lambda: cell.phase is State.IDLE, patience_s=150)
+            cell.lay("blueberry", 1)
+            service = cell.station.service
+            left = asyncio.Event()
+
+            def lose():
+                cell.at(State.RETREATING_READY, left.set)
+                service.device_changed(lost)
+
+            cell.at(State.PLACING_ACCEPT, lose)
+            assert (await cell.line.inspect()).outcome == "PASS"
+            async with asyncio.timeout(60):
+                await left.wait()
+            service.device_changed(lost)
+            await cell.reach(State.HELD)
+            await cell.line.ready()
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
 def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_for_its_own_stop(bench):
     async def scenario():
         async with bench(bench=False, placing="arm") as cell:
