@@ -12,10 +12,11 @@ _AT_THE_FRUIT = {PackmlState.STARTING, PackmlState.EXECUTE}
 
 
 def begins_refused_trigger(work: Work) -> bool:
-    """The station is at a fruit, none is accepted, and a trigger was refused as lost."""
+    """The station is at a fruit, none is accepted, a trigger was refused as lost, and `Resume` is not pending."""
     state = work.state
     at_fruit = isinstance(work.event, Beat) and work.event.station.packml_state in _AT_THE_FRUIT
-    return at_fruit and state.inspection is Inspection.NONE and bool(state.journal.disowned)
+    disowned = at_fruit and state.inspection is Inspection.NONE and bool(state.journal.disowned)
+    return disowned and none_is_pending(work)  # answers come slower than beats where the station's disk is slow
 
 
 none_is_pending = described("`Resume` is not pending.", lambda work: work.state.open_request is None)

@@ -295,7 +295,8 @@ class ArmLink:
         if seen is not None or latched is ArmCause.SAFEGUARD_STOP:
             await self._end_program(snapshot)
         elif latched is not None and latched not in STATE_CAUSES:
-            return
+            if latched is ArmCause.PROGRAM_STOPPED and snapshot.runtime_state != PLAYING:
+                await self._end_program(snapshot)
         elif snapshot.runtime_state != PLAYING:
             self._store_or_raise(await self._explain(None))
             await self._end_program(snapshot)
@@ -311,7 +312,7 @@ class ArmLink:
             return
         self._end_again_s = time.monotonic() + END_AGAIN_S
         async with dashboard(self._settings.host) as conversation:
-            await conversation.request("stop")
+            log.info("arm link: a paused program is stopped: %s", await conversation.request("stop"))
 
     async def _connect(self) -> ArmProcess:
         async with dashboard(self._settings.host):

@@ -105,7 +105,7 @@ class PlcCommands:
             self.registers, self.registers_wanted = (line.registers, time.monotonic()), False
         self._metrics.heard("plc_interface")
         self._metrics.waiting(line.waiting)
-        if line.plc_alive or line.enabled:  # one that never beats is served as well
+        if line.plc_alive or (line.plc_connected and not line.enable_withdrawn):  # one that never beats is served too
             self._metrics.heard("plc")
 
     def line_fault(self) -> Message | None:

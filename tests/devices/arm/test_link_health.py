@@ -157,6 +157,10 @@ def test_a_program_that_an_open_guard_has_paused_is_stopped_and_the_guard_remain
     assert fault.cause is ArmCause.SAFEGUARD_STOP
 
 
-def test_a_paused_program_is_stopped_also_where_no_bit_shows_why(cause_after, dashboard_requests):
-    assert cause_after(WELL, (True, PAUSED, False)) is ArmCause.PROGRAM_STOPPED
-    assert dashboard_requests == ["stop"]
+def test_a_paused_program_is_stopped_also_where_no_bit_shows_why_and_again_until_it_is(
+    cause_after, dashboard_requests, monkeypatch
+):
+    monkeypatch.setattr(link, "END_AGAIN_S", 0.0)
+    paused = (True, PAUSED, False)
+    assert cause_after(WELL, paused, paused, (True, STOPPED, False), WELL) is ArmCause.PROGRAM_STOPPED
+    assert dashboard_requests == ["stop", "stop"]

@@ -151,8 +151,9 @@ def test_what_the_station_begins_after_its_trigger_was_refused_is_aborted(bench)
     made.actions.clear()
     made.feed(ev.Beat, made.station_state(packml_state=PackmlState.EXECUTE))
     assert "acquiring" in status(made)
-    assert len(made.of(do.RequestOpen)) == 1
-    made.feed(ev.OpenAnswered, made.state.open_request, Open(running=(41, 7), outcomes=()))
+    made.feed(ev.Beat, made.station_state(packml_state=PackmlState.EXECUTE))
+    [asked] = made.of(do.RequestOpen)
+    made.feed(ev.OpenAnswered, asked.number, Open(running=(41, 7), outcomes=()))
     assert [action.outcome.sequence for action in made.of(do.NotifyPublished)] == [41]
     assert (made.state.link, made.state.queue, made.state.journal.acknowledged) == (Link.UP, (), 41)
     made.feed(ev.Beat, made.station_state(packml_state=PackmlState.EXECUTE))
