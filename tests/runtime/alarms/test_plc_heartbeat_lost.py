@@ -43,7 +43,7 @@ def test_a_plc_is_missed_once_its_enable_was_withdrawn_and_not_before_its_first_
         async with bench() as cell:
 
             async def until(alarm, **values):
-                line = Line(plc_connected=connected, plc_alive=False, waiting=0, counters={}, faults=(), **values)
+                line = Line(plc_alive=False, waiting=0, counters={}, faults=(), **values)
                 async with asyncio.timeout(60):
                     while True:
                         word = (await cell.line.client.request(line, StationState, deadline_s=20)).alarms
@@ -53,9 +53,12 @@ def test_a_plc_is_missed_once_its_enable_was_withdrawn_and_not_before_its_first_
 
             await cell.line.order(CommandName.RESET)
             unheard_s = await asyncio.to_thread(plc_age_s, cell.configuration.metrics.port)
-            assert not await until(AlarmId.NO_RECIPE, enabled=True), "the enabled line was evaluated, and is not missed"
+            assert not await until(AlarmId.NO_RECIPE, enabled=True, plc_connected=True), (
+                "the enabled line was evaluated, and is not missed"
+            )
             assert await asyncio.to_thread(plc_age_s, cell.configuration.metrics.port) < unheard_s
-            assert await until(AlarmId.PLC_HEARTBEAT_LOST, enabled=False, enable_withdrawn=True)
+            lost = {"enabled": False, "enable_withdrawn": True, "plc_connected": connected}
+            assert await until(AlarmId.PLC_HEARTBEAT_LOST, **lost)
 
     asyncio.run(scenario())
 
