@@ -38,6 +38,7 @@ from station.channel.panel_recipe_orders import (
     SubmitRecipe,
 )
 from station.charts.area_chart import Curve, Kind, Limit
+from station.errors import BadInputError
 from station.messages.message import Message
 from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import content_sha256
@@ -68,11 +69,16 @@ async def recipes(request: Request, hmi: HmiNow) -> Response:
 async def recipe(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
     """Show one recipe: the revision in force, the draft, the differences, the possible actions."""
     state = await _state(hmi, name)
-    shown = recipe_of(state.submitted) if state.submitted else state.control.recipe if state.control else None
+    shown, problem = state.control.recipe if state.control else None, None
+    if state.submitted:
+        try:
+            shown = recipe_of(state.submitted)
+        except BadInputError as error:  # it is shown all the same, so that it can be rejected
+            shown, problem = None, error.message
     new = shown if state.submitted else state.file.recipe if state.file else None
     changes = changes_of(state.control.recipe, new) if state.control and new else ()
     drawn = None if shown is None else await _drawn(hmi, locale, shown, shown.model_dump(mode="json"))
-    return show(request, "recipe.html.j2", row=state, changes=changes, drawn=drawn, tab="standing")
+    return show(request, "recipe.html.j2", row=state, changes=changes, problem=problem, drawn=drawn, tab="standing")
 
 
 @router.get("/{name}/edit")

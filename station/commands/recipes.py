@@ -288,7 +288,10 @@ def _format_revision(each: Revision, before: Revision | None) -> list[str]:
     if each.status is Status.RETIRED and each.retired_utc_ms is not None:
         lines.append(f"    retired by {each.retired_by} at {formatted(each.retired_utc_ms)}: {each.retired_reason}")
     if before is not None:
-        lines += [f"    {difference}" for difference in differences(before.recipe, each.recipe)]
+        try:
+            lines += [f"    {difference}" for difference in differences(before.recipe, each.recipe)]
+        except SettingsError as error:  # one of them is not accepted any more
+            lines += [f"    {line}" for line in str(error).splitlines()]
     return lines
 
 

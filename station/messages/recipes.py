@@ -92,7 +92,7 @@ ANOTHER_WAITS = define(
 )
 ANOTHER_WAITS_DIFFERS = define(
     "recipe.another_waits_differs",
-    "recipe {recipe}: revision {revision} of {author} waits for approval, and differs from this one in {changes}; let "
+    "recipe {recipe}: revision {revision} of {author} waits for approval, and differs from this one: {changes}; let "
     "it be approved or retired first",
     revision=Number(),
     changes=Nested(),

@@ -11,7 +11,6 @@ from typing import Any
 
 from station.errors import BadInputError
 from station.messages import recipes as messages
-from station.recipe_store.difference import described_differences
 from station.recipe_store.files import check_unique, locked, prepared, read_folder
 from station.recipe_store.history import Person
 from station.recipe_store.reader import BASE
@@ -139,8 +138,7 @@ class RecipeEditor:
         seen = [each for each in self._store.history(file.recipe.name) if each.sha256.startswith(base.lower())]
         told = {"recipe": file.recipe.name, "base": base[:12], "now": now[:12]}
         if seen and len(base) >= _SHORTEST_BASE:
-            changes = described_differences(seen[-1].recipe, file.recipe)
-            raise ConflictError(messages.CHANGED_SINCE_IN(**told, changes=changes))
+            raise ConflictError(messages.CHANGED_SINCE_IN(**told, changes=seen[-1].changes_to(file.recipe)))
         raise ConflictError(messages.CHANGED_SINCE(**told))
 
     def _put(self, file: ValidFile, text: str, recipe: Recipe, action: str, person: Person) -> None:

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 from sqlalchemy import Connection, func, insert, select, update
 
 from station.messages import recipes as messages
-from station.recipe_store.difference import described_differences
 from station.recipe_store.revision import STATUS, ConflictError, Origin, RecipeStoreError, Revision, Status
 from station.records.audit import AuditEntry, append_audit
 from station.records.clock import utc_ms
@@ -40,17 +39,13 @@ def submit(connection: Connection, text: str, recipe: Recipe, person: Person) ->
     """
     known = read_revisions(connection, recipe.name)
     approved, draft = _with(known, Status.APPROVED), _with(known, Status.DRAFT)
-    if approved is not None and approved.recipe == recipe:
+    if approved is not None and approved.holds(recipe):
         raise RecipeStoreError(messages.SAME(recipe=recipe.name, revision=approved.revision))
-    if draft is not None and draft.recipe == recipe and draft.author == person.who:
+    if draft is not None and draft.holds(recipe) and draft.author == person.who:
         return draft
     if draft is not None and draft.author != person.who:
-        changes = described_differences(draft.recipe, recipe)
-        raise ConflictError(
-            messages.ANOTHER_WAITS_DIFFERS(
-                recipe=recipe.name, revision=draft.revision, author=draft.author, changes=changes
-            )
-        )
+        told = {"recipe": recipe.name, "revision": draft.revision, "author": draft.author}
+        raise ConflictError(messages.ANOTHER_WAITS_DIFFERS(**told, changes=draft.changes_to(recipe)))
     if draft is not None:
         _retire(connection, draft, person, f"replaced by its author's next draft: {person.reason}")
     made = _new(known, text, recipe, Origin.SUBMITTED, person)
@@ -79,10 +74,10 @@ def approve(connection: Connection, wanted: Revision, file: Recipe | None, perso
         raise ConflictError(messages.NOT_WAITING(**place, status=status))
     if draft.author.casefold().split() == person.who.casefold().split():
         raise RecipeStoreError(messages.OWN(**place, author=draft.author))
-    if file != draft.recipe:
-        if file is None:
-            raise ConflictError(messages.FILE_UNREADABLE(**place))
-        raise ConflictError(messages.FILE_DIFFERS(**place, changes=described_differences(draft.recipe, file)))
+    if file is None:
+        raise ConflictError(messages.FILE_UNREADABLE(**place))
+    if not draft.holds(file):
+        raise ConflictError(messages.FILE_DIFFERS(**place, changes=draft.changes_to(file)))
     for other in read_revisions(connection):
         if other.status is Status.APPROVED and other.name != draft.name and other.number == draft.number:
             raise RecipeStoreError(messages.NUMBER_TAKEN(**place, number=draft.number, other=other.name))
@@ -97,7 +92,7 @@ def approve(connection: Connection, wanted: Revision, file: Recipe | None, perso
         approved_utc_ms=utc_ms(),
     )
     _update(connection, made)
-    changes = str(described_differences(before.recipe, draft.recipe)) if before else "the first revision"
+    changes = str(before.changes_to(file)) if before else "the first revision"
     old = None if before is None else _audited(before)
     _note(connection, person, "recipe.approved", made, old, {**_audited(made), "changes": changes})
     return made

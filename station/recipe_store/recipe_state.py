@@ -133,7 +133,7 @@ def _no_file_note(name: str, broken: Sequence[Problem], control: Control | None)
 
 def _draft_note(name: str, file: ValidFile, control: Control | None, submitted: Revision | None) -> Message:
     todo = messages.DO_SUBMIT(recipe=name)
-    if submitted is not None and submitted.recipe == file.recipe:
+    if submitted is not None and submitted.holds(file.recipe):
         todo = messages.DO_APPROVE(revision=submitted.revision, author=submitted.author)
     told = {"recipe": name, "file": file.path.name, "stays": _in_force(control), "todo": todo}
     if control is None:

@@ -6,6 +6,9 @@ from functools import lru_cache
 
 from station.errors import StationError
 from station.messages import recipes as messages
+from station.messages.message import Message, message_of
+from station.recipe_store.difference import described_differences
+from station.settings.problems import SettingsError
 from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import parse_recipe
 
@@ -83,6 +86,20 @@ class Revision:
             SettingsError: this program does not accept it any more.
         """
         return _parsed(self.text, f"{self.name}@{self.revision}")
+
+    def holds(self, recipe: Recipe) -> bool:
+        """Check that its recipe is this one: never, where this program does not accept it any more."""
+        try:
+            return self.recipe == recipe
+        except SettingsError:
+            return False
+
+    def changes_to(self, recipe: Recipe) -> Message:
+        """Return the differences of a recipe from its own, or why its own cannot be read any more."""
+        try:
+            return described_differences(self.recipe, recipe)
+        except SettingsError as error:
+            return messages.REVISION_NOT_ACCEPTED(why=message_of(error))
 
 
 @lru_cache(maxsize=256)

@@ -108,7 +108,7 @@ class RecipeStore(RecipeReader):
             own = [each for each in history if each.name == file.recipe.name]
             last = next((each for each in reversed(own) if each.status is not Status.DRAFT), None)
             if last is None or (
-                last.status is Status.APPROVED and last.origin is Origin.SHIPPED and last.recipe != file.recipe
+                last.status is Status.APPROVED and last.origin is Origin.SHIPPED and not last.holds(file.recipe)
             ):
                 wanted.append(file)
         return wanted

@@ -8,12 +8,14 @@ import pytest
 
 from hmi.web.roles import Role
 from station.inspection.alarm_table import ALARMS, AlarmId
+from station.recipe_store.history import Person, submit
 from station.recipe_store.store import RecipeStore
 from station.records.audit import AuditEntry
+from station.records.direct_transaction import direct_transaction
 from station.records.lots import start_lot
 from station.records.model import AlarmEntry, InspectionRecord, RecipeSnapshot, Trigger
 from station.records.records import Records
-from station.settings.recipe import find_recipe
+from station.settings.recipe import find_recipe, shipped_folder
 from station.settings.records import RecordsSettings
 from tests.hmi.test_security import log_in
 
@@ -53,6 +55,22 @@ def test_history_lots_and_audit_trail_are_there_while_the_station_is_away(pages,
         whole = json.loads(pages("GET", f"/api/v1/inspections/{fruit}")[2])
         assert (whole["outcome"], whole["lot"]) == ("FAIL", "A-17")
         assert json.loads(pages("GET", "/api/v1/lots/A-17")[2])["grower"] == "Meadow Farm"
+
+
+def test_a_draft_that_this_program_refuses_is_shown_so_that_it_can_be_rejected(pages, tmp_path):
+    """Submitted to an earlier program."""
+    RecipeStore(tmp_path, None).begin({})
+    recipe, text = find_recipe("raspberry"), (shipped_folder() / "raspberry.yaml").read_text(encoding="utf-8")
+    text = text.replace("least_area_mm2: 31", "least_area_mm2: 70")
+    with direct_transaction(tmp_path / "records") as connection:
+        submit(connection, text, recipe.model_copy(update={"title": "Another"}), Person("Ida", "quality", "softer"))
+    with pages.context.past:
+        log_in(pages, "Ana", Role.ADMIN)
+        status, _, body = pages("GET", "/recipes/raspberry")
+        assert status == 200
+        assert b"his program does not accept that revision any more: raspberry@2:" in body
+        assert b"No difference from the recipe in force" not in body
+        assert b"/recipes/raspberry/reject" in body
 
 
 def test_recipes_their_history_and_past_curves_are_there_while_the_station_is_away(pages, fruit, tmp_path):

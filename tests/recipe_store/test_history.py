@@ -136,7 +136,7 @@ def test_of_two_people_the_second_is_told_what_the_first_has_changed(begun, stat
     does("Cy", "edit", "strawberry", "--set", f"{LIMIT}=116")
     code, told = station("recipes", "submit", "strawberry", "--who", "Cy", "--reason", "x")
     assert code == 1
-    assert f"revision 2 of Bo waits for approval, and differs from this one in {LIMIT}: 114.0 → 116.0" in told
+    assert f"revision 2 of Bo waits for approval, and differs from this one: {LIMIT}: 114.0 → 116.0" in told
     code, told = station("recipes", "approve", "strawberry", "--who", "Ida", "--reason", "x")
     assert code == 1
     assert f"file differs: {LIMIT}: 114.0 → 116.0" in told

@@ -160,7 +160,7 @@ class ActiveRecipes:
         """Check that the history has exactly this content as this revision."""
         with contextlib.suppress(StationError, ValueError):
             revision = self._store.revision(active.recipe.name, int(active.snapshot.revision))
-            return revision.recipe == active.recipe
+            return revision.holds(active.recipe)
         return False
 
     def _take(self, controls: Iterable[Control]) -> None:
@@ -175,7 +175,7 @@ class ActiveRecipes:
             if quiet or (state.name, sha256) in self._noticed:
                 continue
             self._noticed.add((state.name, sha256))
-            if file is not None and submitted is not None and submitted.recipe == file.recipe:
+            if file is not None and submitted is not None and submitted.holds(file.recipe):
                 continue
             changes = str(state.file_state)
             if control and file:
