@@ -1,6 +1,5 @@
 """Damage thresholds: limits of area and growth, their scaling with the fruit's size, and the guard band."""
 
-from collections.abc import Iterator
 from itertools import pairwise
 from statistics import NormalDist
 from typing import Annotated, Literal, Self
@@ -284,16 +283,21 @@ class DamageThresholds(Settings):
                 wrong.append((("area", index, "area_mm2"), messages.THRESHOLD_FALLING(value=after.area_mm2)))
         return self.accepted(*wrong, *self._kept_by_no_area())
 
-    def _kept_by_no_area(self) -> Iterator[tuple[Path, Message]]:
-        """Find the limits that no area keeps with its guard band on either side: no fruit would pass.
+    def _kept_by_no_area(self) -> list[tuple[Path, Message]]:
+        """Find the limits that no area keeps with its guard band on either side, where no fruit would pass by that.
 
         The guard band is that of the repeatability alone, which every press has. Its other components, and a fruit's
-        size, are the press's.
+        size, are the press's. A fruit whose area is too small at one limit is not trusted there, and left to the others
+        unless every limit decides: by `every_trusted` it has to keep the last, by `first_trusted` any.
         """
+        wrong: list[tuple[Path, Message]] = []
         for index, limit in enumerate(self.area):
+            if self.decided_by == "every_trusted" and limit is not self.area[-1]:
+                continue
             guard = self.uncertainty.factor * self.uncertainty.repeatability_at(limit.closing_mm)
             if limit.least_area_mm2 * (1 + guard) > limit.area_mm2 * (1 - guard):
                 expected = messages.KEPT_BY_NO_AREA(
                     limit_mm2=limit.area_mm2, guard_percent=100 * guard, value=limit.least_area_mm2
                 )
-                yield ("area", index, "least_area_mm2"), expected
+                wrong.append((("area", index, "least_area_mm2"), expected))
+        return [] if self.decided_by == "first_trusted" and len(wrong) < len(self.area) else wrong

@@ -436,6 +436,48 @@ def test_a_limit_with_no_room_above_its_least_area_is_refused_since_no_raspberry
             load_recipe(path)
 
 
+@pytest.mark.parametrize(
+    ("decided_by", "without_room", "refused"),
+    [
+        ("every_limit", (), ()),
+        ("every_limit", (0,), (0,)),
+        ("every_limit", (1,), (1,)),
+        ("every_limit", (0, 1), (0, 1)),
+        ("every_trusted", (0,), ()),
+        ("every_trusted", (1,), (1,)),
+        ("every_trusted", (0, 1), (1,)),
+        ("first_trusted", (0,), ()),
+        ("first_trusted", (1,), ()),
+        ("first_trusted", (0, 1), (0, 1)),
+    ],
+)
+def test_limits_without_room_are_refused_where_by_the_judge_no_fruit_passes(
+    small, write, decided_by, without_room, refused
+):
+    """Of fruit with straight curves, their presses without any uncertainty but the repeatability."""
+    recipe, text = load_recipe(write(small)), small.replace("damage:\n", f"damage:\n  decided_by: {decided_by}\n")
+    area = list(recipe.damage.area)
+    for index in without_room:
+        largest_mm2 = area[index].area_mm2
+        area[index] = area[index].model_copy(update={"least_area_mm2": 0.9 * largest_mm2})
+        line = f"      area_mm2: {largest_mm2:g}\n"
+        text = text.replace(line, f"{line}      least_area_mm2: {0.9 * largest_mm2:g}\n")
+    damage = recipe.damage.model_copy(update={"area": tuple(area), "decided_by": decided_by})
+    recipe = recipe.model_copy(update={"damage": damage})
+    curves = [
+        tuple(Measured(float(at), slope * at / 4, round(1000 * at), 0.9) for at in range(9)) for slope in range(4, 120)
+    ]
+    passes = any(judge(Press(24.0, 0.0, points), recipe).outcome == "PASS" for points in curves)
+    assert passes == (not refused)
+    if refused:
+        with pytest.raises(SettingsError) as caught:
+            load_recipe(write(text))
+        found = re.findall(r": damage\.area\[(\d)\]\.least_area_mm2: expected room below", str(caught.value))
+        assert [int(index) for index in found] == list(refused)
+    else:
+        assert load_recipe(write(text)) == recipe
+
+
 def test_what_a_recipe_does_not_say_is_left_out_of_its_values(small, write):
     """So that recipes of before these fields keep their content hash, and with it their approval."""
     values = load_recipe(write(small)).model_dump()
