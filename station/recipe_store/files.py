@@ -1,6 +1,7 @@
 """Recipe files of a folder: reading, locking, and atomic writing with a backup."""
 
 import fcntl
+import logging
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -20,6 +21,8 @@ from station.settings.yaml_loader import parse_document
 
 BACKUPS = "recipe_backups"
 _LOCK = "recipes.lock"
+
+log = logging.getLogger(__name__)
 
 
 class Folder(NamedTuple):
@@ -125,9 +128,12 @@ def prepared(path: Path, text: str, home: Path) -> Iterator[Callable[[], None]]:
     def put_in_place() -> None:
         try:
             new.replace(path)
-            sync_folder(path.parent)
         except OSError as error:
             raise _unwritable(path, error) from error
+        try:
+            sync_folder(path.parent)
+        except OSError as error:  # the new file is in place all the same: to call it unchanged would be untrue
+            log.warning("%s: written, but a loss of power may bring the former file back: %s", path, error)
 
     try:
         yield put_in_place

@@ -12,6 +12,7 @@ import pytest
 from sqlalchemy.engine.default import DefaultDialect
 
 from station.messages import recipes
+from station.recipe_store import files
 from station.recipe_store.revision import RecipeStoreError
 from station.records.model import RecipeSnapshot
 from station.runtime.recipes.active import ActiveRecipes
@@ -303,6 +304,22 @@ def test_the_audit_trail_says_that_an_edited_file_could_not_be_written(begun, st
     told = station("audit", "show", "--action", "recipe.", "--last", "2")[1]
     assert told.index("recipe.edited") < told.index("recipe.not_written")
     assert "No space left on device" in told
+
+
+def test_an_edited_file_that_is_in_place_and_may_not_be_durable_is_not_called_unchanged(
+    begun, station, site, monkeypatch, caplog
+):
+    def failing(_folder):
+        raise OSError(errno.EIO, "Input/output error")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(files, "sync_folder", failing)
+        code, told = station(*EDIT)
+    assert code == 0, told
+    assert load_recipe(site / "strawberry.yaml").damage.area[0].area_mm2 == 113
+    (warning,) = [record.getMessage() for record in caplog.records if record.name == files.__name__]
+    assert "strawberry.yaml: written, but a loss of power may bring the former file back: " in warning
+    assert "recipe.not_written" not in station("audit", "show")[1]
 
 
 def test_nothing_of_an_edit_waits_for_the_disk_while_the_station_cannot_write(begun, station, site, home, monkeypatch):
