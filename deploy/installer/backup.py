@@ -53,7 +53,9 @@ def make_backup(layout: Layout, release: Path, kind: str) -> Path:
         _copied(layout.home / name, partial / STATE / name)
     _copied(layout.settings, partial / SETTINGS)
     partial.rename(copy)
-    (layout.home / LAST_BACKUP).touch()
+    # Made anew: where root makes the backup, it must not follow a link which the station's user has put there.
+    (layout.home / LAST_BACKUP).unlink(missing_ok=True)
+    (layout.home / LAST_BACKUP).touch(exist_ok=False)
     own(layout, layout.home / LAST_BACKUP, NAME, NAME)
     return copy
 

@@ -1,8 +1,8 @@
 """Subprocesses of the installer."""
 
+import grp
 import os
 import pwd
-import shutil
 import subprocess
 from collections.abc import Mapping
 from pathlib import Path
@@ -62,6 +62,9 @@ def known_user() -> bool:
 
 
 def own(layout: Layout, path: Path, user: str, group: str) -> None:
-    """Change a path's owner; does nothing in a scratch root, as another user than root, or without that user."""
+    """Change a path's owner; does nothing in a scratch root, as another user than root, or without that user.
+
+    A link's own owner is changed: the station's user can put a link to any file into its folders.
+    """
     if layout.is_system and os.geteuid() == 0 and known_user():
-        shutil.chown(path, user, group)
+        os.chown(path, pwd.getpwnam(user).pw_uid, grp.getgrnam(group).gr_gid, follow_symlinks=False)

@@ -1,12 +1,15 @@
 """Copies of records, state and configuration, as the timer has them made."""
 
+import grp
 import json
 import os
+import pwd
 import shutil
 import sqlite3
 import subprocess
 import sys
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 
@@ -99,6 +102,24 @@ def test_a_complete_copy_is_what_the_metrics_tell_the_time_of(root, installed):
     (installed.home / "records/records.sqlite3").write_text("this is no database")
     assert backup(root, installed).returncode == 1
     assert last_backup_utc_s(installed.home) == 1.0
+
+
+def test_a_link_that_the_stations_user_put_there_is_not_followed(root, installed, installer, monkeypatch, tmp_path):
+    shadow, missing = tmp_path / "shadow", tmp_path / "missing"
+    shadow.touch()
+    os.utime(shadow, (1.0, 1.0))
+    (installed.home / "last_backup").symlink_to(shadow)
+    assert backup(root, installed).returncode == 0
+    assert shadow.stat().st_mtime == 1.0
+    assert not (installed.home / "last_backup").is_symlink()
+
+    # One's own name is given to a link that leads nowhere, which needs no root; whoever followed it would fail.
+    (link := tmp_path / "link").symlink_to(missing)
+    programs = installer("programs")
+    user, group = pwd.getpwuid(os.getuid())[0], grp.getgrgid(os.getgid())[0]
+    monkeypatch.setattr(programs, "known_user", lambda: True)
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    programs.own(installer("layout").Layout(Path("/")), link, user, group)
 
 
 def test_a_file_that_cannot_be_read_is_named(installer, installed, monkeypatch):
