@@ -17,12 +17,11 @@ from station.channel.panel import (
     ShelveAlarm,
     UnshelveAlarm,
 )
-from station.commands.records_options import by_option, config_option
+from station.commands.records_options import by_option, config_option, site_or_last_good
 from station.errors import StationError
 from station.inspection.alarms import LONGEST_SHELVED_S
 from station.records.clock import formatted
 from station.records.texts import printable
-from station.settings.configuration import load_configuration
 from station.settings.plc import line_endpoint
 
 ReplyT = TypeVar("ReplyT", bound=ChannelMessage)
@@ -93,7 +92,7 @@ def _order(config: Path | None, request: ChannelMessage) -> None:
 
 
 async def _ask(config: Path | None, request: ChannelMessage, reply: type[ReplyT]) -> ReplyT:
-    site = load_configuration(config)
+    site = site_or_last_good(config)
     async with ChannelClient(line_endpoint(site.handshake, site.home), "the station") as station:
         try:
             return await station.request(request, reply, deadline_s=_DEADLINE_S)

@@ -11,6 +11,7 @@ from station.channel.client import ChannelClient
 from station.channel.line import CommandDone, Open, Resume
 from station.channel.messages import DeadlineError
 from station.channel.panel import Recover, RecoveryName
+from station.commands.records_options import site_or_last_good
 from station.devices.arm.faults import ArmFault
 from station.devices.arm.probe import probe_arm
 from station.devices.arm.ur import UrArm
@@ -63,7 +64,7 @@ def recover(what: RecoveryName, config: Path | None, yes: bool) -> None:  # noqa
     """
     if not yes:
         click.confirm("Is the cause found, and nobody at the arm?", abort=True)
-    asyncio.run(_recover(load_configuration(config), what))
+    asyncio.run(_recover(site_or_last_good(config), what))
     click.echo("the arm is ready")
 
 

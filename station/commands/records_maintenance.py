@@ -5,7 +5,14 @@ from pathlib import Path
 import click
 
 from station.channel.panel_queries import LotView
-from station.commands.records_options import by_option, config_option, folder_of, proof_options, public_keys_option
+from station.commands.records_options import (
+    by_option,
+    config_option,
+    folder_of,
+    proof_options,
+    public_keys_option,
+    site_or_last_good,
+)
 from station.errors import StationError
 from station.records.audit import AuditEntry, append_audit
 from station.records.audit_check import Proof
@@ -22,7 +29,6 @@ from station.records.restore import restore_backup
 from station.records.short_transaction import short_transaction
 from station.records.signing import public_keys_of
 from station.records.texts import printable
-from station.settings.configuration import load_configuration
 
 _ROLE = "command line"
 _thing = click.argument("thing", metavar="SEQUENCE|LOT")
@@ -127,7 +133,7 @@ def backup(directory: Path, config: Path | None) -> None:
     DIR appears when it is complete and on the disk; it must not exist before. It takes nothing of the space below which
     the station removes images.
     """
-    site = load_configuration(config)
+    site = site_or_last_good(config)
     reserve_bytes = 2 * site.records.free_reserve_mb * MB
     made = make_backup(records_folder(site.home), directory, reserve_bytes)
     click.echo(f"{directory}: {made.inspections} inspections, {made.images} images, {made.size_bytes} bytes, verified")

@@ -35,16 +35,23 @@ def load_or_last_good(file: Path | None, environ: Mapping[str, str] | None = Non
         SettingsError: it is broken, and there is no last good one.
     """
     environ = os.environ if environ is None else environ
+    configuration, broken = read_or_last_good(file, environ)
+    if broken:
+        log.warning("%s; the last good configuration is used", broken)
+    else:
+        StateFiles(configuration.home).write(_name(file, environ), configuration.model_dump_json().encode())
+    return configuration, broken
+
+
+def read_or_last_good(file: Path | None, environ: Mapping[str, str]) -> tuple[Configuration, str]:
+    """Read the configuration or the last good one, as `load_or_last_good` does, without storing or logging."""
     try:
-        configuration = load_configuration(file, environ)
+        return load_configuration(file, environ), ""
     except SettingsError as error:
         last_good = read_last_good(file, environ)
         if last_good is None:
             raise
-        log.warning("%s; the last good configuration is used", error)
         return last_good, str(error)
-    StateFiles(configuration.home).write(_name(file, environ), configuration.model_dump_json().encode())
-    return configuration, ""
 
 
 def read_last_good(file: Path | None, environ: Mapping[str, str]) -> Configuration | None:

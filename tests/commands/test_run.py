@@ -49,6 +49,12 @@ def running(file, values, log):
     assert process.returncode == 0, log.read_text()
 
 
+def station(file, values, *arguments):
+    environment = {**os.environ, "STATION_CONFIG": str(file), "STATION_HOME": values["home"]}
+    command = [sys.executable, "-m", "station", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, env=environment)
+
+
 def page(values, name, path):
     with urllib.request.urlopen(f"http://127.0.0.1:{values[name]['port']}{path}", timeout=20) as answer:
         return answer.read().decode()
@@ -70,6 +76,13 @@ def test_a_mistake_in_the_file_does_not_keep_the_station_from_its_next_start(sit
         assert "<html" in page(values, "hmi", "/")
         with ModbusTcpClient("127.0.0.1", port=values["modbus"]["port"]) as plc:
             assert not plc.read_holding_registers(0, count=1, device_id=1).isError()
+        for command in (("alarms", "list"), ("records", "backup", str(tmp_path / "copy"))):
+            done = station(file, values, *command)
+            assert done.returncode == 0, done.stderr
+            assert "modbus.port" in done.stderr
+            assert "the last good configuration is used" in done.stderr
+        done = station(file, values, "devices", "recover", "power", "--yes")
+        assert "the last good configuration is used" in done.stderr, "this bench has no arm, which the station says"
     log = (tmp_path / "second.log").read_text()
     assert "modbus.port" in log
     assert "the last good configuration is used" in log
