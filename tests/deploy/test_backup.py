@@ -28,7 +28,7 @@ def make_installation(installer, folder):
     for made in (layout.settings, layout.home, layout.backups):
         made.mkdir(parents=True)
     layout.configuration.write_text("hmi: {port: 8443}\n")
-    (layout.home / "active_recipe.json").write_text("{}")
+    (layout.home / "golden_reference.png").write_text("untouched gel")
     (layout.home / "run").mkdir()
     return layout
 
@@ -69,7 +69,7 @@ def test_all_that_cannot_be_made_again_is_copied_and_the_oldest_goes(root, insta
     assert len(copies) == 2
     newest = copies[-1]
     assert (newest / "settings/station.yaml").read_text() == "hmi: {port: 8443}\n"
-    assert (newest / "state/active_recipe.json").exists()
+    assert (newest / "state/golden_reference.png").exists()
     assert not (newest / "state/run").exists()
     assert json.loads((newest / "records/backup.json").read_text())["sequence"] == 41
     assert (
@@ -161,6 +161,7 @@ def test_a_replacement_machine_is_restored_as_the_document_has_it(root, installe
         ("held_for_a_person", "no", "fruit_held"),
         ("mode", "1", "3"),
         ("plc/journal.json", "1", ""),
+        ("active_recipe.json", "then", ""),
     ):
         (lost.home / name).write_text(then)
         if now:
@@ -196,6 +197,7 @@ def test_a_replacement_machine_is_restored_as_the_document_has_it(root, installe
     assert (new.home / "held_for_a_person").read_text() == "fruit_held", "what is so in the cell now"
     assert (new.home / "mode").read_text() == "3"
     assert not (new.home / "plc").exists()
+    assert not (new.home / "active_recipe.json").exists(), "a person chooses the recipe of the fruit that runs now"
     after = new.settings.stat()
     assert (after.st_uid, after.st_gid) == (before.st_uid, before.st_gid)
     log = (tmp_path / "log").read_text()
