@@ -65,10 +65,12 @@ def prune(layout: Layout, kind: str, keep: int, made: Path) -> None:
     """Remove the backups of a kind, as for `make_backup`, but for so many newest ones, of which `made` is one.
 
     Their age is that of the records in them, by the highest number given: a clock that was set back makes names that
-    sort before older ones.
+    sort before older ones. Numbers never go down, so those with a higher one than `made` are of records before a new
+    beginning, and are the oldest.
     """
+    last = _sequence(made)
     others = [path for path in layout.backups.glob(f"{kind}*") if path.is_dir() and path != made]
-    others.sort(key=lambda path: (_sequence(path), path.name))
+    others.sort(key=lambda path: ((number := _sequence(path)) <= last, number, path.name))
     for path in others[: max(0, len(others) + 1 - keep)]:
         shutil.rmtree(path)
         print_progress(f"removed {path}, which was older than the last {keep}")

@@ -223,6 +223,17 @@ def test_after_a_clock_was_set_back_the_copy_just_made_stays_and_the_oldest_reco
     assert (installed.backups / made / "settings/station.yaml").exists()
 
 
+def test_after_records_began_anew_the_backups_of_those_before_go_first(root, installed):
+    begin_records(installed, 50)
+    for day, sequence in ((1, 99_999), (2, 100_000), (3, 48), (4, 49)):
+        made_before(installed, f"daily-2026010{day}T000000Z", sequence)
+    done = backup(root, installed, "--keep", "3")
+    assert done.returncode == 0, done.stdout
+    left = {path.name for path in installed.backups.iterdir()}
+    assert len(left) == 3
+    assert left > {"daily-20260103T000000Z", "daily-20260104T000000Z"}
+
+
 def test_a_rollback_without_its_copy_is_refused_where_the_records_need_it(installed, installer):
     old = installed.current.resolve()
     installer("layout").point(installed.previous, old)
