@@ -67,6 +67,8 @@ async def one(request: Request, hmi: HmiNow, alarm: AlarmName) -> Response:
 @router.get("/alarms/{alarm}/part")
 async def one_part(request: Request, hmi: HmiNow, locale: LocaleNow, alarm: AlarmName) -> Response:
     """Render the same as a part, for polling; the page reloads itself once the alarm is normal or shelved."""
+    if not hmi.gateway.fresh:
+        raise Problem(503, "problem.no_answer")  # the page greys the part that it cannot renew
     values = _one(request, hmi, alarm)
     if values is None:
         return Response(headers={"x-state": "normal"})

@@ -1,9 +1,11 @@
 """The alarms page in a real browser."""
 
 import re
+import time
 
 import pytest
 
+from hmi.web.gateway import STALE_S
 from hmi.web.roles import Role
 from station.channel.line import CommandDone
 from station.channel.panel import ListedAlarm
@@ -14,6 +16,20 @@ from tests.hmi.test_security import log_in
 from tests.slower_mode import SLOWER_MODE
 
 
+def become(gateway, since_ms):
+    row = ALARMS[AlarmId.CAMERA_LOST]
+    alarm = ListedAlarm(
+        alarm="camera_lost", number=row.number, priority="high", state="unacknowledged", active=True, latched=False,
+        detail=None, since_utc_ms=since_ms, raised=1, cause=row.cause, consequence=row.consequence,
+        action=row.action, document="", shelved_until_utc_ms=None, shelved_by="",
+    )  # fmt: skip
+    gateway.state = PanelState.model_construct(  # pyrefly: ignore[missing-argument]
+        utc_ms=since_ms, alarms=(alarm,), state="idle", ready=True, busy=False, why_not_ready=None,
+        packml_state=None, recipe=None, simulated=False,
+    )  # fmt: skip
+    gateway.heard_s = time.monotonic()
+
+
 @pytest.mark.parametrize("path", ["/alarms", "/alarms/camera_lost"])
 def test_what_was_raised_after_the_page_was_shown_is_not_acknowledged_by_it(pages, monkeypatch, path):
     sent = []
@@ -22,18 +38,6 @@ def test_what_was_raised_after_the_page_was_shown_is_not_acknowledged_by_it(page
         sent.append(order)
         return CommandDone(done=True, why=None)
 
-    def become(since_ms):
-        row = ALARMS[AlarmId.CAMERA_LOST]
-        alarm = ListedAlarm(
-            alarm="camera_lost", number=row.number, priority="high", state="unacknowledged", active=True, latched=False,
-            detail=None, since_utc_ms=since_ms, raised=1, cause=row.cause, consequence=row.consequence,
-            action=row.action, document="", shelved_until_utc_ms=None, shelved_by="",
-        )  # fmt: skip
-        pages.context.gateway.state = PanelState.model_construct(  # pyrefly: ignore[missing-argument]
-            utc_ms=since_ms, alarms=(alarm,), state="idle", ready=True, busy=False, why_not_ready=None,
-            packml_state=None, recipe=None, simulated=False,
-        )  # fmt: skip
-
     def acknowledge():
         form = page.partition('action="/alarms/camera_lost/acknowledge"')[2].partition("</form>")[0]
         fields = dict(re.findall('name="([^"]+)" value="([^"]*)"', form))
@@ -41,12 +45,20 @@ def test_what_was_raised_after_the_page_was_shown_is_not_acknowledged_by_it(page
 
     monkeypatch.setattr(pages.context.gateway, "request", request)
     log_in(pages, "Ana", Role.OPERATOR)
-    become(1_790_000_000_000)
+    become(pages.context.gateway, 1_790_000_000_000)
     page = pages("GET", path)[2].decode()
-    become(1_790_000_600_000)
+    become(pages.context.gateway, 1_790_000_600_000)
     assert (acknowledge(), sent) == (409, [])
     page = pages("GET", path)[2].decode()
     assert (acknowledge(), len(sent)) == (303, 1)
+
+
+def test_an_alarm_of_a_station_that_does_not_answer_is_not_renewed_as_if_it_were_live(pages):
+    gateway = pages.context.gateway
+    become(gateway, 1_790_000_000_000)
+    assert pages("GET", "/alarms/camera_lost/part")[0] == 200
+    gateway.heard_s -= STALE_S + 1
+    assert pages("GET", "/alarms/camera_lost/part")[0] == 503
 
 
 @pytest.mark.timeout(240)
