@@ -82,7 +82,10 @@
             }
           }
         }
-        age.renewed();
+        // A finger on the part keeps what came out of it: what is shown then ages.
+        if (filled === html) {
+          age.renewed();
+        }
         pauseMs = everyMs;
         await shown(part);
         if (headers.get("x-over")) {

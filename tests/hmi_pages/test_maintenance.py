@@ -113,6 +113,16 @@ def test_what_a_page_asks_for_itself_is_greyed_where_no_answer_comes(orchard: An
     assert not part.evaluate("part => part.inert")
 
 
+def test_what_a_finger_keeps_from_being_renewed_is_greyed(orchard: Any, panel: Any) -> None:
+    page = panel().go("/maintenance/registers")
+    part = page.locator("[data-poll]")
+    part.hover()
+    page.mouse.down()  # the heartbeat changes with each answer
+    expect(part).to_have_class(re.compile("old-part"))
+    page.mouse.up()
+    expect(part).not_to_have_class(re.compile("old-part"))
+
+
 def test_a_verification_without_a_calibration_says_what_to_do(orchard: Any, panel: Any) -> None:
     person = panel("Max")
     expect(person.go("/maintenance/sensor").get_by_text("set manual mode, 3, first")).to_be_visible()
