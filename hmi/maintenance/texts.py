@@ -12,7 +12,8 @@ define("maintenance.support", "Support bundle")
 define(
     "maintenance.support_text",
     "One ZIP file with versions, configuration, recipes, logs, alarms and the last inspections. Passwords, PINs, keys,"
-    " people, the audit trail and images are not in it.",
+    " the file of people, the audit trail and images are not in it. Logs and alarms name people: who logged in and from"
+    " where, who ordered what.",
 )
 define("maintenance.support_get", "Download the support bundle")
 define("maintenance.support_log_in", "To download it, log in as maintenance.")

@@ -19,8 +19,8 @@ from station.support.bundle import bundle
 def support(out: Path | None) -> None:
     """Write a support bundle: versions, configuration, recipes, logs, alarms and recent inspections, nothing secret.
 
-    It works with the station running, stopped or broken. Passwords, PINs, tokens, keys, people, the audit trail and
-    images are not in it.
+    It works with the station running, stopped or broken. Passwords, PINs, tokens, keys, the file of people, the
+    audit trail and images are not in it. Logs and alarms name people: who logged in and from where, who ordered what.
     """
     target = out or Path(f"support-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.zip")
     try:
