@@ -65,10 +65,13 @@ class Past:
     """Reader of the records.
 
     Each method raises `RecordsError` if they cannot be read, and `PanelBusyError` if too many wait or one takes 20 s.
+
+    Args:
+        broken: the error in the configuration's files, where `site` is the last good one; empty for none.
     """
 
-    def __init__(self, site: Configuration) -> None:
-        self._site, self._folder, self._worker = site, site.home / "records", PanelWorker()
+    def __init__(self, site: Configuration, broken: str) -> None:
+        self._site, self._broken, self._folder, self._worker = site, broken, site.home / "records", PanelWorker()
         self.recipes = PastRecipes(site.home, site.recipes_folder, self._worker)
 
     def __enter__(self) -> Self:
@@ -124,7 +127,7 @@ class Past:
 
         def write() -> bytes:
             file = io.BytesIO()
-            bundle(self._site, "", file)
+            bundle(self._site, self._broken, file)
             return file.getvalue()
 
         return await self._worker.do(write)

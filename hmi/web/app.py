@@ -43,8 +43,12 @@ _SWEEP_S = 1.0
 log = logging.getLogger(__name__)
 
 
-def make_context(site: Configuration, file: Path | None) -> Hmi:
-    """Make the parts that all pages use, with the file of the configuration, if any; the gateway is not entered yet.
+def make_context(site: Configuration, file: Path | None, broken: str) -> Hmi:
+    """Make the parts that all pages use; the gateway is not entered yet.
+
+    Args:
+        file: of the configuration, if any.
+        broken: the error in it, where `site` is the last good one; empty for none.
 
     Raises:
         StationError: the user store cannot be read, or the endpoint is none.
@@ -55,7 +59,7 @@ def make_context(site: Configuration, file: Path | None) -> Hmi:
     return Hmi(
         settings=settings,
         gateway=gateway,
-        past=Past(site),
+        past=Past(site, broken),
         jobs=Jobs(site.home),
         sessions=Sessions(settings.idle_s),
         people=UserStore(site.home / FOLDER),

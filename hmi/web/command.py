@@ -20,5 +20,5 @@ def hmi(config: Path | None) -> None:
     themselves.
     """
     configure_logging("hmi")
-    site, _ = load_or_last_good(config)
-    asyncio.run(serve(site, configuration_file(config)))
+    site, broken = load_or_last_good(config)
+    asyncio.run(serve(site, configuration_file(config), broken))

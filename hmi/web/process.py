@@ -26,8 +26,8 @@ LOOPBACK = ("127.", "::1", "localhost")
 log = logging.getLogger(__name__)
 
 
-async def serve(site: Configuration, file: Path | None) -> None:
-    """Serve the pages until SIGINT or SIGTERM, with the file of the configuration, if any.
+async def serve(site: Configuration, file: Path | None, broken: str) -> None:
+    """Serve the pages until SIGINT or SIGTERM; the arguments are those of `make_context`.
 
     Raises:
         StationError: the address, a certificate or the user store cannot be used.
@@ -35,7 +35,7 @@ async def serve(site: Configuration, file: Path | None) -> None:
     ended = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, ended.set)
-    hmi = make_context(site, file)
+    hmi = make_context(site, file, broken)
     limits = Limits(MOST_CONNECTIONS, CONNECTIONS_PER_PAGE * site.hmi.pages_per_address, RESERVED_CONNECTIONS)
     listener = listen(site.hmi.host, site.hmi.port, "hmi", "the pages", limits, hmi.pins.knows)
     hmi.gateway.flooded_by = lambda: listener.flooded_by

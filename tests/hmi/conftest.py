@@ -493,7 +493,7 @@ def pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pages:
     if _FIRST:
         monkeypatch.setattr("hmi.web.app.Renderer", lambda _assets: _FIRST[0][1])
     site = load_configuration(None, {"STATION_HOME": str(tmp_path)})
-    context = make_context(site, tmp_path / "station.yaml")
+    context = make_context(site, tmp_path / "station.yaml", "")
     app = make_app(context)
     if not _FIRST:
         _FIRST.append((app._app, context.renderer))

@@ -34,7 +34,7 @@ class Station:
     """The pages, with the state that a test sets."""
 
     def __init__(self, folder: Path) -> None:
-        context = make_context(load_configuration(None, {"STATION_HOME": str(folder)}), None)
+        context = make_context(load_configuration(None, {"STATION_HOME": str(folder)}), None, "")
         self.pages, self.live, self.boot = Pages(make_app(context), context), context.live, context.boot
         log_in(self.pages)
         self.now = state()

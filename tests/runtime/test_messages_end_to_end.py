@@ -88,7 +88,7 @@ async def served(site: Configuration) -> AsyncIterator[Pages]:
     """Serve the pages of a station."""
     token = ApiTokens(site.home / "hmi").add("test", Role.VIEWER)
     listener = listen("127.0.0.1", 0, "hmi", "the pages", Limits(most=100, per_address=100, reserve=100))
-    server = Server(listener, make_app(make_context(site, None)))
+    server = Server(listener, make_app(make_context(site, None, "")))
     serving = asyncio.create_task(server.run_until_exit(), name="pages")
     try:
         yield Pages(f"http://127.0.0.1:{listener.getsockname()[1]}", token)

@@ -1,5 +1,6 @@
 """Support bundle: what is in it, what never is, and that a broken station gives one too."""
 
+import io
 import json
 import os
 import subprocess
@@ -7,7 +8,10 @@ import sys
 import zipfile
 
 import pytest
+from click.testing import CliRunner
 
+from hmi.web.app import make_context
+from hmi.web.command import hmi
 from station.settings.last_good import load_or_last_good
 
 SECRET = "hunter2-and-more"
@@ -71,6 +75,23 @@ def test_a_broken_configuration_gives_its_error_and_the_last_good_one(home, tmp_
     assert "modbus.unit" in parts["configuration_error.txt"]
     assert json.loads(parts["configuration.json"])["modbus"]["unit"] == 7
     assert parts["logs/service.log"].endswith("the last line\n")
+
+
+def test_the_pages_bundle_has_the_error_too(home, monkeypatch):
+    made = []
+
+    async def serve(*arguments):
+        made.append(await make_context(*arguments).past.support_bundle())
+
+    for name, does in (("configure_logging", lambda *_: None), ("serve", serve)):
+        monkeypatch.setattr(f"hmi.web.command.{name}", does)
+    monkeypatch.setenv("STATION_HOME", str(home))
+    for text in ("modbus: {unit: 7}\n", "modbus: {unit: seven}\n"):
+        (home / "station.yaml").write_text(text)
+        assert CliRunner().invoke(hmi, catch_exceptions=False).exit_code == 0
+    good, broken = (parts_of(io.BytesIO(file)) for file in made)
+    assert "configuration_error.txt" not in good
+    assert "modbus.unit" in broken["configuration_error.txt"]
 
 
 def test_a_configuration_that_was_never_good_gives_its_error_too(home, tmp_path):
