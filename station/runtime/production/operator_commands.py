@@ -189,7 +189,8 @@ class OperatorCommands:
             return lots.ANOTHER(lot=name, now=self._lots.named)
         with contextlib.suppress(RecordsError):  # a lot without a grower was never registered
             await self._records.change(lambda connection: end_lot(connection, name))
-        self._lots.set_lot("")
+        if name == self._lots.named:  # another one may have been started meanwhile
+            self._lots.set_lot("")
         return None
 
 

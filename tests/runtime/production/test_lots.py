@@ -5,8 +5,17 @@ import threading
 
 import pytest
 
+from station.channel.client import ChannelClient
 from station.channel.line import Begin, BeginReply, CommandName
 from station.channel.messages import DeadlineError
+from station.channel.panel import Actor
+from station.channel.panel_live import (
+    GetPanelState,
+    OperatorCommand,
+    OperatorCommandName,
+    OperatorCommandView,
+    PanelState,
+)
 from station.inspection.states import State
 from station.messages import lots, readiness, recipes
 from station.recipe_store.editor import RecipeEditor
@@ -16,6 +25,8 @@ from station.records.audit_check import check_audit
 from station.records.audit_head import read_head
 from station.records.audit_report import read_audit
 from station.records.database import reading, records_folder
+from station.runtime.production import operator_commands
+from station.settings.hmi import panel_endpoint
 from station.vocabulary import Reason, Refusal
 from tests.quick_recipes import NUMBERS
 
@@ -210,3 +221,40 @@ async def begin(cell, trigger_id, lot, deadline_s=20.0):
     await cell.line.ready()
     request = Begin(trigger_id=trigger_id, encoder=7, lot=lot)
     return await cell.line.client.request(request, BeginReply, deadline_s=deadline_s)
+
+
+def test_the_end_of_a_lot_leaves_one_that_was_started_while_the_disk_was_slow(bench, monkeypatch):
+    ending, may_end = threading.Event(), threading.Event()
+    end_lot = operator_commands.end_lot
+
+    def slow(*of):
+        ending.set()
+        assert may_end.wait(60)
+        return end_lot(*of)
+
+    monkeypatch.setattr(operator_commands, "end_lot", slow)
+
+    async def scenario():
+        async with bench() as cell:
+            configuration = cell.configuration
+            async with ChannelClient(panel_endpoint(configuration.hmi, configuration.home), "the station") as panel:
+
+                async def give(who, order, lot):
+                    request = OperatorCommand(person=Actor(who=who, role="operator"), order=order, argument=lot)
+                    return await panel.request(request, OperatorCommandView, deadline_s=20)
+
+                async def state():
+                    return await panel.request(GetPanelState(), PanelState, deadline_s=20)
+
+                assert (await give("Ida", OperatorCommandName.START_LOT, "A")).state == "done"
+                given = asyncio.create_task(give("Ida", OperatorCommandName.END_LOT, "A"))
+                assert await asyncio.to_thread(ending.wait, 60)
+                assert (await give("Bo", OperatorCommandName.START_LOT, "B")).state == "done"
+                may_end.set()
+                ticket = (await given).ticket
+                async with asyncio.timeout(60):
+                    while next(each for each in (await state()).orders if each.ticket == ticket).state != "done":
+                        await asyncio.sleep(0.02)
+                return (await state()).named_lot
+
+    assert asyncio.run(scenario()) == "B"
