@@ -28,7 +28,7 @@ from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.manager import DeviceManager
 from station.runtime.imaging.golden_reference import GoldenReference
 from station.runtime.imaging.worker import VisionWorker
-from station.runtime.observability.audit_logger import FLUSH_S, AuditLogger
+from station.runtime.observability.audit_logger import AuditLogger
 from station.runtime.observability.health import HealthServer, Liveness
 from station.runtime.observability.metrics import Metrics
 from station.runtime.observability.observability import Observability
@@ -176,9 +176,7 @@ class Station:
     async def _note_end(self, audit: AuditLogger) -> None:
         """Write the last audit entry of this start, if it can be written in time."""
         audit.log(end_entry(self.boot, requested=self._stop.is_set()))
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(FLUSH_S):
-                await audit.flush()
+        await audit.flush()
 
     async def _until_stop(self, needed: tuple[asyncio.Task[None], ...]) -> None:
         """Wait for the request to end; a required task that ends by a bug ends the process."""

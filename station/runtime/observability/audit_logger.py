@@ -63,9 +63,15 @@ class AuditLogger:
                 self._queued.set()
 
     async def flush(self) -> None:
-        """Write the queue once; what cannot be written is logged."""
-        if not await self._write():
-            log.error("the audit trail could not take: %s", "; ".join(map(str, self._waiting)))
+        """Write the queue once, for `FLUSH_S` at most; what was not written by then is logged."""
+        try:
+            async with asyncio.timeout(FLUSH_S):
+                written = await self._write()
+        except TimeoutError:
+            written = False
+        if not written:
+            under_way = [self._under_way[0]] if self._under_way else []
+            log.error("the audit trail could not take: %s", "; ".join(map(str, [*under_way, *self._waiting])))
 
     async def _write(self) -> bool:
         async with self._writing:

@@ -148,3 +148,25 @@ def test_alarm_changes_beyond_the_most_that_wait_drop_the_oldest_alone(opened, s
 
     scenario(steps)
     assert logged() == [AlarmId.DISK_LOW, AlarmId.OUTBOX_BEHIND, AlarmId.CAMERA_LOST]
+
+
+def test_entries_that_a_slow_disk_has_not_taken_by_the_end_are_logged(opened, scenario, slow, monkeypatch, caplog):
+    monkeypatch.setattr(audit_logger, "FLUSH_S", DEADLINE_S)
+
+    async def steps():
+        async with opened() as records:
+            begun, gate = slow("append_audit")
+            logger = AuditLogger(records)
+            running = asyncio.create_task(logger.run())
+            logger.log(entry("under way"), entry("waiting"))
+            await pass_deadline(begun)
+            await end(running)
+            logger.log(entry("the end"))
+            await logger.flush()
+            gate.set()
+
+    scenario(steps)
+    (lost,) = [record.getMessage() for record in caplog.records if record.levelname == "ERROR"]
+    assert lost.startswith("the audit trail could not take: ")
+    places = [lost.index(repr(subject)) for subject in ("under way", "waiting", "the end")]
+    assert places == sorted(places)
