@@ -85,21 +85,21 @@ def check(path: Path, within_s: float = CHECK_S) -> None:
         raise DamagedError(messages.DAMAGED(place=str(path), words=found), messages.OPEN_AGAIN())
 
 
-def move_aside(folder: Path, *names: str) -> Path:
-    """Move a damaged database, and the files and folders that belong to it, out of the way; missing ones are skipped.
+def new_aside(folder: Path) -> Path:
+    """Return the path of a new folder for what is moved aside, named with date and time."""
+    return folder / "aside" / stamp()
 
-    Returns:
-        The new folder, named with date and time.
+
+def move_aside(folder: Path, aside: Path, *names: str) -> None:
+    """Move a damaged database, and the files and folders that belong to it, out of the way; missing ones are skipped.
 
     Raises:
         OSError: it cannot be moved.
     """
-    aside = folder / "aside" / stamp()
-    aside.mkdir(parents=True)
+    aside.mkdir(parents=True, exist_ok=True)
     for name in names:
         if (folder / name).exists():
             (folder / name).rename(aside / name)
-    return aside
 
 
 def stamp() -> str:

@@ -7,14 +7,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from pydantic import TypeAdapter, ValidationError
 from sqlalchemy import Connection, func, select
 
-from station.atomic_file import sync_folder
+from station.atomic_file import sync_folder, write_atomically
 from station.messages import records as messages
-from station.messages.message import Message
+from station.messages.message import Definition, Message
 from station.records.audit import continue_audit, newer_head, note_unsigned
 from station.records.audit_head import Head, read_head, try_save_head
-from station.records.database import FILE_NAME, check, migrate, move_aside, open_engine
+from station.records.database import FILE_NAME, check, migrate, move_aside, new_aside, open_engine
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, LockedError, RecordsError, SequenceError
 from station.records.high_water_mark import MARK_NAME, HighWaterMark
@@ -27,6 +28,9 @@ from station.records.writer import Writer
 from station.settings.records import RecordsSettings
 
 LOCK_NAME = "lock"
+NOTICE_NAME = "notice.json"
+"""File of the notice of lost records, from before anything is moved aside until its alarm is stored: neither a failed
+opening nor an end of the process forgets it."""
 
 BELONGING = (FOLDER_NAME, f"{FILE_NAME}-wal", f"{FILE_NAME}-shm", FILE_NAME)
 """Files that are moved aside together. The database goes last: while it exists the next start continues the move, and a
@@ -43,6 +47,11 @@ class Notice:
     """The code of the corresponding `RecordsError`, as `damaged`."""
     cause: Message
     remedy: Message
+    aside: str
+    """Folder of what was moved aside."""
+
+
+_NOTICE = TypeAdapter(Notice)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,14 +122,17 @@ def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
 
 
 def _move_damaged_aside(folder: Path, mark: HighWaterMark) -> tuple[Notice, ...]:
-    """Move a damaged database aside, and what a missing one left, if the numbers can continue without it."""
-    path = folder / FILE_NAME
+    """Move a damaged database aside, and what a missing one left, if the numbers can continue without it.
+
+    Returns:
+        The notice of it, or of an earlier loss whose alarm is not stored yet.
+    """
+    path, pending = folder / FILE_NAME, _pending(folder)
     if not path.exists() or not path.stat().st_size:
         if mark.value:
-            aside = move_aside(folder, *BELONGING)
+            path.unlink(missing_ok=True)  # an opening that failed may have begun it, once more with each attempt
             cause = messages.MISSING_DATABASE(path=str(path), number=mark.value)
-            log.error("%s; what it left was moved to %s", cause, aside)
-            return (Notice("damaged", cause, messages.FIND_OLD(folder=str(aside))),)
+            return (_move_aside(folder, pending, DamagedError.code, cause, messages.FIND_OLD),)
         if was_used(folder, mark):
             raise _lost_mark(mark)
         return ()
@@ -129,11 +141,31 @@ def _move_damaged_aside(folder: Path, mark: HighWaterMark) -> tuple[Notice, ...]
     except DamagedError as error:
         if not mark.known:
             raise _lost_mark(mark) from error
-        aside = move_aside(folder, *BELONGING)
-        log.exception("%s; moved to %s", error.cause, aside)
         cause = messages.BEGUN_ANEW(cause=error.cause, number=mark.value)
-        return (Notice(error.code, cause, messages.RECOVER_OLD(folder=str(aside))),)
-    return ()
+        return (_move_aside(folder, pending, error.code, cause, messages.RECOVER_OLD),)
+    return () if pending is None else (pending,)
+
+
+def _move_aside(folder: Path, pending: Notice | None, code: str, cause: Message, remedy: Definition) -> Notice:
+    """Continue the move of a pending notice, or begin another one, whose notice is durable first."""
+    notice = pending
+    if notice is None or any((folder / name).exists() and Path(notice.aside, name).exists() for name in BELONGING):
+        aside = str(new_aside(folder))
+        notice = Notice(code, cause, remedy(folder=aside), aside)
+        write_atomically(folder / NOTICE_NAME, _NOTICE.dump_json(notice))
+        log.error("%s; what is left is moved to %s", cause, aside)
+    move_aside(folder, Path(notice.aside), *BELONGING)
+    return notice
+
+
+def _pending(folder: Path) -> Notice | None:
+    try:
+        return _NOTICE.validate_json((folder / NOTICE_NAME).read_bytes())
+    except FileNotFoundError:
+        return None
+    except ValidationError:
+        log.exception("%s is unreadable: no alarm is raised of it", folder / NOTICE_NAME)
+        return None
 
 
 def was_used(folder: Path, mark: HighWaterMark) -> bool:

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import logging
 import os
 import shutil
 import time
@@ -22,7 +23,7 @@ from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, DiskFullError, RecordsClosedError, RecordsDeadlineError, RecordsError
 from station.records.images import MB, accepted_is_stored
 from station.records.model import AlarmEntry, AlarmRow, FullRecord, InspectionRecord, OpenInspections, Trigger
-from station.records.open import Notice, Opened, lock_folder, open_records
+from station.records.open import NOTICE_NAME, Notice, Opened, lock_folder, open_records
 from station.records.queries import read_alarms, read_inspection, read_open
 from station.records.write_requests import (
     acknowledge,
@@ -37,6 +38,8 @@ from station.records.writer import Work
 from station.settings.records import RecordsSettings
 
 T = TypeVar("T")
+
+log = logging.getLogger(__name__)
 
 READING_S = 10.0
 """Longest wait for a query's answer."""
@@ -76,7 +79,7 @@ class Records:
         self.folder = folder
         self._files = (folder / FILE_NAME, folder / f"{FILE_NAME}-wal")
         self.notices: tuple[Notice, ...] = ()
-        """Findings of the last `open` or `reopen`."""
+        """Findings of the last `open` or `reopen`, and of earlier ones until `forget_notices`."""
         self.lost: tuple[int, ...] = ()
         """The inspections that it ended with `station_lost`."""
         self._settings = settings
@@ -127,6 +130,18 @@ class Records:
             self._why_closed = error
             raise
         self.notices, self.lost = self._opened.notices, self._opened.lost
+
+    async def forget_notices(self) -> None:
+        """Forget the notices, because their alarm is stored; until then each opening has them again."""
+
+        def forget() -> None:
+            try:
+                (self.folder / NOTICE_NAME).unlink(missing_ok=True)
+            except OSError as error:
+                log.warning("the next start raises the alarm of lost records again: %s", error)
+            self.notices = ()
+
+        await asyncio.get_running_loop().run_in_executor(self._helper, forget)
 
     def _shut(self) -> None:
         if self._opened is not None:

@@ -15,7 +15,7 @@ from station.messages import records as messages
 from station.records.audit import append_restored, newer_head
 from station.records.audit_head import Head, read_head, try_save_head
 from station.records.backup import Manifest, copy_image, hash_of, integrity, open_regular, read_manifest
-from station.records.database import FILE_NAME, migrate, move_aside, open_engine
+from station.records.database import FILE_NAME, migrate, move_aside, new_aside, open_engine
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, RecordsError
 from station.records.high_water_mark import MARK_NAME, HighWaterMark
@@ -63,7 +63,9 @@ def restore_backup(folder: Path, directory: Path, by: str, keys: PublicKeys | No
         mark.save()
         head = _continue(folder, new, manifest, by)
         present = [name for name in BELONGING if (folder / name).exists()]
-        aside = move_aside(folder, *present) if present else None
+        aside = new_aside(folder) if present else None
+        if aside is not None:
+            move_aside(folder, aside, *present)
         for name in (FOLDER_NAME, FILE_NAME):
             (new / name).rename(folder / name)
         sync_folder(folder)

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import errno
 import os
 import random
 import resource
@@ -291,8 +292,68 @@ def test_a_damaged_database_is_moved_aside_and_the_numbers_go_on(
             assert len(list((aside / "images").glob("*/*.png"))) == 3, "their images are evidence"
             assert await records.begin(trigger) == 4
         async with opened() as records:
+            assert records.notices == (notice,), "its alarm is not stored yet"
+            await records.forget_notices()
+        async with opened() as records:
             assert records.notices == ()
             assert await records.begin(trigger) == 5
+
+    scenario(steps)
+
+
+def remove(path: Path) -> None:
+    for file in path.parent.glob(f"{FILE_NAME}*"):
+        file.unlink()
+
+
+@pytest.mark.parametrize("lose", [_damage_middle, remove])
+def test_a_loss_is_noticed_and_moved_aside_once_however_many_openings_fail(
+    opened, scenario, trigger, failed, folder, noise, settled, monkeypatch, lose
+):
+    def full(*_of: object) -> None:
+        (folder / FILE_NAME).touch()
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    async def steps():
+        async with opened() as records:
+            sequence = await records.begin(trigger)
+            await records.conclude(sequence, replace(failed, images=(noise(),)))
+            await settled(records)
+        lose(folder / FILE_NAME)
+        with monkeypatch.context() as patch:
+            patch.setattr("station.records.open.migrate", full)
+            for _ in range(3):
+                with pytest.raises(DiskFullError):
+                    async with opened():
+                        pass
+        with monkeypatch.context() as patch:
+            patch.setattr("station.records.open.own_public_key", full)
+            with pytest.raises(DiskFullError):
+                async with opened():
+                    pass
+        async with opened() as records:
+            (notice,) = records.notices
+            (aside,) = (folder / "aside").iterdir()
+            assert notice.aside == notice.remedy.parameters["folder"] == str(aside)
+            assert len(list((aside / "images").glob("*/*.png"))) == 1
+            assert (aside / FILE_NAME).exists() == (lose is _damage_middle)
+            assert await records.begin(trigger) == sequence + 1
+
+    scenario(steps)
+
+
+def test_a_second_loss_before_the_alarm_of_the_first_is_stored_is_moved_to_a_folder_of_its_own(
+    opened, scenario, trigger, folder
+):
+    async def steps():
+        async with opened() as records:
+            await records.begin(trigger)
+        for number in (1, 2):
+            _damage_middle(folder / FILE_NAME)
+            async with opened() as records:
+                (notice,) = records.notices
+                assert notice.aside == str(max((folder / "aside").iterdir()))
+                assert len(list(folder.glob(f"aside/*/{FILE_NAME}"))) == number
 
     scenario(steps)
 

@@ -2,12 +2,17 @@
 
 import asyncio
 import contextlib
+import errno
 import json
+import os
 
 import pytest
 
 from station.inspection.alarm_table import AlarmId
+from station.messages import records as messages
+from station.records import open as opening
 from station.records.database import FILE_NAME
+from station.records.errors import RecordsDeadlineError
 from station.records.model import Trigger
 from station.records.records import Records
 from station.runtime.station import Station
@@ -118,6 +123,65 @@ def test_records_lost_while_the_station_runs_are_an_alarm_also_after_the_next_st
             assert is_raised_for(service, database)
             await until_stored(service, "unacknowledged")
         async with started(site) as service:
+            assert is_raised_for(service, database)
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize("lose", [damage, remove])
+def test_records_lost_in_a_start_that_ended_before_the_alarm_was_stored_are_an_alarm_of_the_next(site, database, lose):
+    lose(database)
+
+    async def scenario():
+        records = await Records.open(site.home / "records", RecordsSettings(free_reserve_mb=1), "ends at once")
+        await records.close()
+        async with started(site) as service:
+            assert is_raised_for(service, database)
+
+    asyncio.run(scenario())
+
+
+def test_records_lost_in_an_opening_that_failed_are_an_alarm_once_they_are_open(site, database, monkeypatch):
+    damage(database)
+    migrate, attempts = opening.migrate, []
+
+    def full_at_first(*of):
+        attempts.append(of)
+        if len(attempts) == 1:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        migrate(*of)
+
+    monkeypatch.setattr(opening, "migrate", full_at_first)
+
+    async def scenario():
+        async with started(site) as service:
+            assert service.registry.fault is not None
+            async with asyncio.timeout(LIMIT_S):
+                while alarm_of(service).state == "normal":
+                    await asyncio.sleep(0.02)
+            assert is_raised_for(service, database)
+            await until_stored(service, "unacknowledged")
+
+    asyncio.run(scenario())
+
+
+def test_records_lost_are_an_alarm_where_the_stored_alarms_cannot_be_read_at_first(site, database, monkeypatch):
+    damage(database)
+    load_alarms, attempts = Records.load_alarms, []
+
+    async def slow_at_first(self):
+        attempts.append(self)
+        if len(attempts) == 1:
+            raise RecordsDeadlineError(messages.TOO_SLOW(limit_s=2.0), messages.CHECK_DISK())
+        return await load_alarms(self)
+
+    monkeypatch.setattr(Records, "load_alarms", slow_at_first)
+
+    async def scenario():
+        async with started(site) as service:
+            async with asyncio.timeout(LIMIT_S):
+                while alarm_of(service).state == "normal":
+                    await asyncio.sleep(0.02)
             assert is_raised_for(service, database)
 
     asyncio.run(scenario())

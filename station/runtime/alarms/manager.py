@@ -218,6 +218,9 @@ class AlarmManager:
             except RecordsError as error:
                 log.warning("alarms are not remembered: %s", error)
                 self._unsaved = [*entries, *self._unsaved][-_MOST_UNSAVED:]
+                continue
+            if any(entry.id == AlarmId.RECORDS_LOST for entry in entries):
+                await records.forget_notices()
 
     def _set(self, alarms: Alarms, alarm: AlarmId, change: str, detail: Message | None = None) -> bool:
         if alarms.get(alarm) == self.alarms.get(alarm):
