@@ -113,6 +113,7 @@ class Station:
         observability = Observability(self.boot, versions, metrics, liveness, audit)
         inspector = Inspector(devices, vision, configuration, alarms, metrics)
         self.service = service = Service(configuration, records, devices, inspector, alarms, observability)
+        alarms.expect_restore()
         # The first start of a release may migrate the records of years, which takes longer than any other start.
         async with extended_start():
             await service.registry.reopen(lambda: alarms.restore(records))

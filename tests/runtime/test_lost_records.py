@@ -185,3 +185,31 @@ def test_records_lost_are_an_alarm_where_the_stored_alarms_cannot_be_read_at_fir
             assert is_raised_for(service, database)
 
     asyncio.run(scenario())
+
+
+@pytest.mark.parametrize("failing", ["reopen", "load_alarms"])
+def test_alarms_of_the_previous_start_outlive_an_opening_that_fails_at_first(site, database, monkeypatch, failing):
+    damage(database)
+
+    async def scenario():
+        async with started(site) as service:
+            await until_stored(service, "unacknowledged")
+        sound, attempts = getattr(Records, failing), []
+
+        async def slow_at_first(self):
+            attempts.append(self)
+            if len(attempts) == 1:
+                raise RecordsDeadlineError(messages.TOO_SLOW(limit_s=2.0), messages.CHECK_DISK())
+            return await sound(self)
+
+        monkeypatch.setattr(Records, failing, slow_at_first)
+        async with started(site) as service:
+            assert alarm_of(service).state == "normal"
+            async with asyncio.timeout(LIMIT_S):
+                while service.registry.fault is not None:
+                    await asyncio.sleep(0.02)
+            assert is_raised_for(service, database)
+        async with started(site) as service:
+            assert is_raised_for(service, database)
+
+    asyncio.run(scenario())

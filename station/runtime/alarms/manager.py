@@ -91,6 +91,7 @@ class AlarmManager:
         """All alarms, as a value."""
         self._metrics = metrics
         self._present: set[AlarmId] = set()
+        self._to_restore = False
         self._device_alarms: dict[str, AlarmId | None] = {}
         """Last alarm of each device's monitor; a reference may raise the same one of a camera."""
         self._unsaved: list[AlarmEntry] = []
@@ -172,12 +173,16 @@ class AlarmManager:
             self.alarms = later
             self._publish_active()
 
+    def expect_restore(self) -> None:
+        """Store nothing until `restore` has succeeded: it would replace the alarms of the previous start."""
+        self._to_restore = True
+
     async def restore(self, records: Records) -> None:
-        """Restore the alarms of the previous start, and raise that of lost records.
+        """Restore the alarms of the previous start, and raise that of lost records; what is known now has changed since.
 
         Their causes count as present until a check clears them.
         """
-        self.alarms = Alarms.from_data(
+        stored = Alarms.from_data(
             [
                 {
                     "id": row.id,
@@ -191,7 +196,10 @@ class AlarmManager:
                 for row in await records.load_alarms()
             ]
         )
-        self._present = {alarm.id for alarm in self.alarms.known.values() if alarm.state in CAUSED}
+        former = {alarm.id: alarm for alarm in stored.known.values() if alarm.id not in self.alarms.known}
+        self.alarms = Alarms({**former, **self.alarms.known})
+        self._present |= {alarm.id for alarm in former.values() if alarm.state in CAUSED}
+        self._to_restore = False
         self._publish_active()
         self.report_lost_records(records.notices)
 
@@ -200,6 +208,8 @@ class AlarmManager:
         while True:
             await self._changed.wait()
             self._changed.clear()
+            if self._to_restore:
+                continue
             entries, self._unsaved = tuple(self._unsaved), []
             rows = tuple(
                 AlarmRow(

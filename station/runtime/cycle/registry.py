@@ -29,6 +29,7 @@ class InspectionRegistry:
         self.records = records
         self.fault: RecordsError | None = None
         """Of the records, until they were reopened."""
+        self._restore: Callable[[], Awaitable[None]] | None = None
         self._on_outcome: Callable[[Inspection], None] = lambda _: None
         self._triggers, self._devices, self._versions = triggers, devices, versions
         self._begun: list[Inspection] = []
@@ -43,12 +44,14 @@ class InspectionRegistry:
         """Open the records, again after a fault, which ends once they can be used and `reserve_bytes` are free.
 
         Args:
-            restore: reads what another part needs of them.
+            restore: reads what another part needs of them; tried again with each opening until it has succeeded.
         """
+        self._restore = restore or self._restore
         try:
             await self.records.reopen()
-            if restore is not None:
-                await restore()
+            if self._restore is not None:
+                await self._restore()
+            self._restore = None
         except RecordsError as error:
             self.fault = error
         else:
