@@ -90,7 +90,7 @@ class Station:
         configuration, settings = self._configuration, self._configuration.service
         versions = {PROGRAM: version(PROGRAM)}
         liveness, metrics = Liveness(), Metrics(versions[PROGRAM], settings.inspection_deadline_s or _USUAL_DEADLINE_S)
-        kept, alarms = StateFiles(configuration.home), AlarmManager(metrics)
+        kept, alarms = StateFiles(configuration.home), AlarmManager(metrics, to_restore=True)
         records = Records(configuration.home / "records", configuration.records, self.boot)
         stack.push_async_callback(records.close)
         audit = AuditLogger(records)
@@ -113,7 +113,6 @@ class Station:
         observability = Observability(self.boot, versions, metrics, liveness, audit)
         inspector = Inspector(devices, vision, configuration, alarms, metrics)
         self.service = service = Service(configuration, records, devices, inspector, alarms, observability)
-        alarms.expect_restore()
         # The first start of a release may migrate the records of years, which takes longer than any other start.
         async with extended_start():
             await service.registry.reopen(lambda: alarms.restore(records))

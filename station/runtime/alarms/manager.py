@@ -86,12 +86,18 @@ def alarm_of(device: str, fault: StationError) -> AlarmId:
 class AlarmManager:
     """Alarm states of the station. Every method is immediate; `store_changes` makes the changes durable afterwards."""
 
-    def __init__(self, metrics: Metrics) -> None:
+    def __init__(self, metrics: Metrics, *, to_restore: bool = False) -> None:
+        """Begin without alarms.
+
+        Args:
+            metrics: count the active ones.
+            to_restore: store nothing before `restore` has succeeded, which would replace the previous start's alarms.
+        """
         self.alarms = Alarms()
         """All alarms, as a value."""
         self._metrics = metrics
         self._present: set[AlarmId] = set()
-        self._to_restore = False
+        self._to_restore = to_restore
         self._device_alarms: dict[str, AlarmId | None] = {}
         """Last alarm of each device's monitor; a reference may raise the same one of a camera."""
         self._unsaved: list[AlarmEntry] = []
@@ -173,12 +179,8 @@ class AlarmManager:
             self.alarms = later
             self._publish_active()
 
-    def expect_restore(self) -> None:
-        """Store nothing until `restore` has succeeded: it would replace the alarms of the previous start."""
-        self._to_restore = True
-
     async def restore(self, records: Records) -> None:
-        """Restore the alarms of the previous start, and raise that of lost records; what is known now has changed since.
+        """Restore the alarms of the previous start but those that are known by now, and raise that of lost records.
 
         Their causes count as present until a check clears them.
         """
