@@ -17,7 +17,8 @@ from station.channel.panel import (
     ShelveAlarm,
     UnshelveAlarm,
 )
-from station.commands.records_options import by_option, config_option, site_or_last_good
+from station.commands.records_options import by_option, config_option
+from station.commands.site import site_or_last_good
 from station.errors import StationError
 from station.inspection.alarms import LONGEST_SHELVED_S
 from station.records.clock import formatted

@@ -11,7 +11,7 @@ from station.channel.client import ChannelClient
 from station.channel.line import CommandDone, Open, Resume
 from station.channel.messages import DeadlineError
 from station.channel.panel import Recover, RecoveryName
-from station.commands.records_options import site_or_last_good
+from station.commands.site import site_or_last_good
 from station.devices.arm.faults import ArmFault
 from station.devices.arm.probe import probe_arm
 from station.devices.arm.ur import UrArm

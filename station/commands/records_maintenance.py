@@ -5,14 +5,8 @@ from pathlib import Path
 import click
 
 from station.channel.panel_queries import LotView
-from station.commands.records_options import (
-    by_option,
-    config_option,
-    folder_of,
-    proof_options,
-    public_keys_option,
-    site_or_last_good,
-)
+from station.commands.records_options import by_option, config_option, folder_of, proof_options, public_keys_option
+from station.commands.site import site_or_last_good
 from station.errors import StationError
 from station.records.audit import AuditEntry, append_audit
 from station.records.audit_check import Proof

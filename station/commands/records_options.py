@@ -1,7 +1,6 @@
 """Options shared by commands of `station records`."""
 
 import getpass
-import os
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,8 +15,7 @@ from station.records.audit_head import Head
 from station.records.database import records_folder
 from station.records.search import Query
 from station.records.signing import read_public_key
-from station.settings.configuration import Configuration, load_configuration
-from station.settings.last_good import read_or_last_good
+from station.settings.configuration import load_configuration
 
 config_option = click.option(
     "--config",
@@ -30,14 +28,6 @@ config_option = click.option(
 def folder_of(config: Path | None) -> Path:
     """Return the records' folder of the configuration's file that the user named."""
     return records_folder(load_configuration(config).home)
-
-
-def site_or_last_good(config: Path | None) -> Configuration:
-    """Return the configuration by which the station runs: while its file is broken the last good one, with a note."""
-    site, broken = read_or_last_good(config, os.environ)
-    if broken:
-        click.echo(f"{broken}\nthe last good configuration is used", err=True)
-    return site
 
 
 public_keys_option = click.option(

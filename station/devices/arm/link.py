@@ -36,7 +36,8 @@ BEAT_S = 0.1
 BEAT_DEADLINE_S = 1.0
 FIRST_PAUSE_S = 0.2
 LONGEST_PAUSE_S = 3.0
-UPLOAD_TRIES = BEGIN_TRIES = 3
+UPLOAD_TRIES = 3
+"""Starts of a program that does not come to play, before a person is called."""
 SETTLE_S = 0.5
 POLL_S = 0.01
 FIRST_LEASE_S = 2.0
@@ -59,7 +60,7 @@ class ArmLink:
         self._failures = 0
         self._healthy_until_s = 0.0
         self._was_healthy = True
-        self._tries_left = BEGIN_TRIES
+        self._tries_left = UPLOAD_TRIES
         self._end_again_s = 0.0
         self._lock = asyncio.Lock()
         self._maintaining: asyncio.Task[None] | None = None
@@ -389,7 +390,7 @@ class ArmLink:
         return Beat(healthy_for_s=max(0.0, self._healthy_until_s - time.monotonic()))
 
     def _up(self) -> None:
-        self._failures, self._tries_left = 0, BEGIN_TRIES
+        self._failures, self._tries_left = 0, UPLOAD_TRIES
         self._was_healthy = self.healthy
         self.attachment += 1
         self._set(None)

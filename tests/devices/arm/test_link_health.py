@@ -62,17 +62,23 @@ def dashboard_requests(monkeypatch):
     return requests
 
 
+def linked() -> tuple[link.ArmLink, Any]:
+    """A link that is up, of a healthy station, and its process."""
+    process: Any = Process()
+    arm = link.ArmLink(ArmSettings())
+    arm._process = process
+    arm.renew_health(60.0)
+    arm._up()
+    return arm, process
+
+
 @pytest.fixture
 def cause_after(dashboard_requests):
     """The cause of a stop after some beats; of each: is the station healthy, the program's state, late kicks."""
 
     def run(*beats):
         async def scenario():
-            process: Any = Process()
-            arm = link.ArmLink(ArmSettings())
-            arm._process = process
-            arm.renew_health(60.0)
-            arm._up()
+            arm, process = linked()
             for healthy, process.state, process.kicks_late in beats:
                 arm.renew_health(60.0 if healthy else -0.05)
                 await arm._watch(process)
@@ -110,11 +116,7 @@ def test_a_connection_that_the_controller_closed_is_lost_whatever_was_received_l
     """ur-rtde stops the program where it connects again by itself: that was nobody on the pendant."""
 
     async def scenario():
-        process: Any = Process()
-        arm = link.ArmLink(ArmSettings())
-        arm._process = process
-        arm.renew_health(60.0)
-        arm._up()
+        arm, process = linked()
         process.state, process.connected = state, False
         with pytest.raises(ArmFault) as watched:
             await arm._watch(process)
@@ -137,11 +139,7 @@ def test_a_program_that_an_open_guard_has_paused_is_stopped_and_the_guard_remain
     monkeypatch.setattr(link, "END_AGAIN_S", 0.0)
 
     async def scenario():
-        process: Any = Process()
-        arm = link.ArmLink(ArmSettings())
-        arm._process = process
-        arm.renew_health(60.0)
-        arm._up()
+        arm, process = linked()
         process.state, process.safety_bits = PAUSED, GUARD_OPEN
         await arm._watch(process)
         assert dashboard_requests == ["stop"]
