@@ -49,14 +49,9 @@ OTHER_DRAFT = define(
 RESULTS_NOT_WRITTEN = define(
     "whatif.results_not_written", "{path}: {words}; free space, and the same command continues"
 )
-NO_CLUSTER_EXTRA = define(
-    "whatif.no_cluster_extra", "--scheduler: install the extra first: pip install fruit-station[cluster]"
-)
-NO_SCHEDULER = define("whatif.no_scheduler", "--scheduler {address}: no Dask scheduler answers there: {words}")
 NO_WORKERS = define(
     "whatif.no_workers", "--scheduler {address}: it has no workers; start some with `dask worker {address}`"
 )
-BAD_SCHEDULER = define("whatif.bad_scheduler", "--scheduler {address}: expected tcp://HOST:PORT or tls://HOST:PORT")
 PROCESS_ENDED = define(
     "whatif.process_ended",
     "a process of the what-if was ended from outside, perhaps for want of memory; the same command continues where it "

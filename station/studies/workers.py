@@ -13,6 +13,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from typing import NoReturn, TypeVar
 
+from station.dask_client import connect
 from station.errors import BadInputError, StationError
 from station.memory import keep_freed_memory
 from station.studies.folder import identity_of
@@ -22,7 +23,6 @@ One = TypeVar("One")
 Answer = TypeVar("Answer")
 
 _PR_SET_PDEATHSIG = 1
-_CLUSTER_TIMEOUT_S = 10
 
 
 def on_this_machine(work: Callable[[One], Answer], tasks: Sequence[One], jobs: int) -> Iterator[Answer]:
@@ -84,22 +84,9 @@ def on_cluster(tasks: Sequence[Task], address: str) -> Iterator[SampleResult]:
         BadInputError: Dask is not installed here, or the address does not answer.
         StationError: the cluster failed while it measured.
     """
-    try:
-        import distributed  # noqa: PLC0415 (an optional extra, and slow to import)
-    except ImportError as error:
-        raise BadInputError(
-            "--scheduler needs Dask, which is not installed: pip install 'fruit-station[cluster]'"
-        ) from error
-    try:
-        client = distributed.Client(address, timeout=_CLUSTER_TIMEOUT_S)
-    except (OSError, ValueError, TypeError) as error:
-        raise BadInputError(
-            f"--scheduler {address}: no Dask scheduler answers there within {_CLUSTER_TIMEOUT_S} s; expected an "
-            "address such as tcp://10.0.0.5:8786: is `dask scheduler` running, and no firewall between?"
-        ) from error
-    with client:
+    with connect(address) as client:
         _check_workers(client, address, tasks[0])
-        yield from _gathered(client, distributed.as_completed, tasks)
+        yield from _gathered(client, tasks)
 
 
 def measure_on_cluster(task: Task) -> SampleResult:
@@ -130,10 +117,12 @@ def _check_workers(client, address: str, task: Task) -> None:  # noqa: ANN001 (o
         )
 
 
-def _gathered(client, as_they_come: Callable, tasks: Sequence[Task]) -> Iterator[SampleResult]:  # noqa: ANN001 (of an optional library)
+def _gathered(client, tasks: Sequence[Task]) -> Iterator[SampleResult]:  # noqa: ANN001 (of an optional library)
+    import distributed  # noqa: PLC0415 (an optional extra, and slow to import)
+
     futures = client.map(measure_on_cluster, tasks, pure=False, retries=2)
     try:
-        for future in as_they_come(futures):
+        for future in distributed.as_completed(futures):
             yield future.result()
     except Exception as error:
         raise StationError(

@@ -1,8 +1,6 @@
 """Runner of a what-if: many inspections judged again on all cores, or on a Dask cluster."""
 
-import importlib
 import multiprocessing
-import socket
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -11,11 +9,11 @@ from contextlib import closing, contextmanager
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
-from urllib.parse import urlsplit
 
 import cv2
 
-from station.errors import BadInputError, StationError
+from station.dask_client import connect
+from station.errors import StationError
 from station.messages import whatif as messages
 from station.records.database import reading
 from station.settings.recipe_model import Recipe
@@ -24,7 +22,6 @@ from station.whatif.stored import StoredPress, read_stored
 
 CHUNK = 200
 _WITH_IMAGES = 8
-_REACH_S = 10.0
 _AHEAD = 3
 """Batches that wait for each worker: enough that none is idle, few enough that memory stays small."""
 _ALONE_S = 2.0
@@ -106,32 +103,12 @@ def _on_cores(parts: Iterator[Batch], jobs: int) -> Iterator[list[Replayed]]:
 @contextmanager
 def _cluster(address: str) -> Iterator[tuple[Callable[[Batch], Any], int]]:
     """Use workers of a Dask cluster; they need this program installed, and nothing of this machine's disk."""
-    try:
-        distributed = importlib.import_module("distributed")
-    except ImportError as error:
-        raise BadInputError(messages.NO_CLUSTER_EXTRA()) from error
-    _reach(address)
-    try:
-        client = distributed.Client(address, timeout=f"{_REACH_S:g}s", set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise BadInputError(messages.NO_SCHEDULER(address=address, words=str(error))) from error
-    with closing(client):
+    with closing(connect(address)) as client:
         width = sum(client.nthreads().values())
         if not width:
             raise StationError(messages.NO_WORKERS(address=address))
         executor = client.get_executor(pure=False)
         yield lambda batch: executor.submit(replay_batch, batch), width
-
-
-def _reach(address: str) -> None:
-    """Connect to the scheduler first: Dask's own client leaves threads and tracebacks if nothing answers."""
-    try:
-        parts = urlsplit(address)
-        if parts.scheme not in {"tcp", "tls"} or parts.hostname is None or parts.port is None:
-            raise BadInputError(messages.BAD_SCHEDULER(address=address))
-        socket.create_connection((parts.hostname, parts.port), _REACH_S).close()
-    except (OSError, ValueError) as error:
-        raise BadInputError(messages.NO_SCHEDULER(address=address, words=str(error))) from error
 
 
 def _flow(

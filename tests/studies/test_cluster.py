@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from station.dask_client import connect
+from station.errors import BadInputError
+
 ARGUMENTS = ("--fruit", "raspberry", "--samples", "2", "--seed", "2", "--method", "robust")
 DEADLINE_S = 280
 
@@ -48,6 +51,12 @@ def test_an_address_where_nobody_answers_is_told(unused_port: int, tmp_path: Pat
     assert found.returncode == 2
     assert "no Dask scheduler answers there" in found.stderr
     assert "Traceback" not in found.stderr
+
+
+def test_a_closed_port_is_refused_before_dasks_client_would_retry_it(unused_port: int, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("distributed.Client", lambda *_, **__: pytest.fail("it retries for ten seconds"))
+    with pytest.raises(BadInputError, match="no Dask scheduler answers there"):
+        connect(f"tcp://127.0.0.1:{unused_port}")
 
 
 def test_a_worker_that_dask_started_does_not_map_each_image_anew():
