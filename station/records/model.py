@@ -1,7 +1,6 @@
 """Records' data model: plain values, so that no other package's types are stored."""
 
 import hashlib
-import json
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,6 +12,7 @@ import numpy.typing as npt
 from station.channel.line import Outcome, OutcomeName
 from station.inspection.fruit_size import FruitSize
 from station.messages.message import Message
+from station.settings.recipe_versions import canonical_text
 
 ImageKind = Literal["reference", "step", "mask"]
 
@@ -32,8 +32,7 @@ class RecipeSnapshot:
     @classmethod
     def of(cls, values: Mapping[str, Any], revision: str = "") -> "RecipeSnapshot":
         """Make a snapshot of a recipe's values, as `Recipe.model_dump(mode="json")` gives them, and its revision."""
-        text = json.dumps(values, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-        return cls(values["name"], values["plc_number"], revision, text)
+        return cls(values["name"], values["plc_number"], revision, canonical_text(values))
 
     @property
     def sha256(self) -> str:

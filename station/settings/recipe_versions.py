@@ -83,12 +83,14 @@ def rename(values: MutableMapping[str, Any], old: str, new: str) -> None:
         comments[new] = comment
 
 
-def canonical_text(recipe: Recipe) -> str:
-    """Return a recipe's values as canonical JSON, the input of its hash and the PLC's checksum."""
-    values = recipe.model_dump(mode="json")
+def canonical_text(values: Mapping[str, Any]) -> str:
+    """Return a recipe's values, as `Recipe.model_dump(mode="json")` gives them, as canonical JSON.
+
+    It is the input of the recipe's hash and of the PLC's checksum, and what the records store.
+    """
     return json.dumps(values, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
 def content_sha256(recipe: Recipe) -> str:
     """Return the hash that identifies a recipe; comments and layout are no part of it."""
-    return hashlib.sha256(canonical_text(recipe).encode()).hexdigest()
+    return hashlib.sha256(canonical_text(recipe.model_dump(mode="json")).encode()).hexdigest()
