@@ -5,7 +5,6 @@ import hmac
 import json
 import math
 import secrets
-import time
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from hmi.web.roles import Role
 from station.atomic_file import write_atomically
+from station.clock import utc_ms
 from station.errors import BadInputError, StationError
 
 FILE_NAME = "api_tokens.json"
@@ -67,7 +67,7 @@ class ApiTokens:
         except StationError:
             return None
         found = [(name, each) for name, each in self._tokens.items() if hmac.compare_digest(each.sha256, sha256)]
-        valid = [(name, each.role) for name, each in found if (each.expires_utc_ms or math.inf) > _utc_ms()]
+        valid = [(name, each.role) for name, each in found if (each.expires_utc_ms or math.inf) > utc_ms()]
         return valid[0] if valid else None
 
     def add(self, name: str, role: Role, days: int | None = None) -> str:
@@ -88,7 +88,7 @@ class ApiTokens:
             raise BadInputError(f"there are {MOST_TOKENS} tokens already; remove one first")
         token = PREFIX + secrets.token_urlsafe(32)
         sha256 = hashlib.sha256(token.encode()).hexdigest()
-        now_ms = _utc_ms()
+        now_ms = utc_ms()
         expires_ms = None if days is None else now_ms + days * _DAY_MS
         made = Token(role=role, sha256=sha256, made_utc_ms=now_ms, expires_utc_ms=expires_ms)
         self._write({**self._tokens, name: made})
@@ -128,7 +128,3 @@ class ApiTokens:
         except OSError as error:
             raise StationError(f"{self._path} cannot be written: {error.strerror}; make its folder writable") from error
         self._tokens, self._seen = tokens, None
-
-
-def _utc_ms() -> int:
-    return time.time_ns() // 1_000_000

@@ -27,6 +27,7 @@ from station.channel.line import (
     StationState,
 )
 from station.channel.messages import ChannelError, DeadlineError, RefusedError
+from station.clock import utc_ms
 from station.settings.plc import HandshakeSettings
 
 OUTCOME_GRACE_S = 1.0
@@ -42,7 +43,7 @@ log = logging.getLogger(__name__)
 
 def now() -> ev.Moment:
     """Return the time on both clocks."""
-    return ev.Moment(time.monotonic(), time.time_ns() // 1_000_000)
+    return ev.Moment(time.monotonic(), utc_ms())
 
 
 class StationLink:

@@ -17,11 +17,11 @@ from station.channel.panel import (
     ShelveAlarm,
     UnshelveAlarm,
 )
+from station.clock import formatted
 from station.commands.records_options import by_option, config_option
 from station.commands.site import site_or_last_good
 from station.errors import StationError
 from station.inspection.alarms import LONGEST_SHELVED_S
-from station.records.clock import formatted
 from station.records.texts import printable
 from station.settings.plc import line_endpoint
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from station.clock import formatted
 from station.errors import BadInputError
 from station.recipe_store.difference import differences
 from station.recipe_store.editor import RecipeEditor
@@ -14,7 +15,6 @@ from station.recipe_store.history import Person
 from station.recipe_store.recipe_state import FileState, RecipeState
 from station.recipe_store.revision import Revision, Status
 from station.recipe_store.store import RecipeStore
-from station.records.clock import formatted
 from station.settings.configuration import load_configuration
 from station.settings.problems import SettingsError, shortened, shortened_file
 from station.settings.recipe import Recipe, check_recipes, recipe_files

@@ -5,13 +5,13 @@ from pathlib import Path
 import click
 
 from station.channel.panel_queries import LotView
+from station.clock import formatted
 from station.commands.records_options import by_option, config_option, folder_of, proof_options, public_keys_option
 from station.commands.site import site_or_last_good
 from station.errors import StationError
 from station.records.audit import AuditEntry, append_audit
 from station.records.audit_check import Proof
 from station.records.backup import make_backup
-from station.records.clock import formatted
 from station.records.database import reading, records_folder
 from station.records.holds import hold as place_hold
 from station.records.holds import read_holds

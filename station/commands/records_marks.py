@@ -4,9 +4,9 @@ from pathlib import Path
 
 import click
 
+from station.clock import formatted
 from station.commands.records_options import by_option, config_option, folder_of
 from station.records.audit import AuditEntry, append_audit
-from station.records.clock import formatted
 from station.records.database import reading
 from station.records.marks import Mark, place_mark, read_marked
 from station.records.short_transaction import short_transaction

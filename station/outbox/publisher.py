@@ -4,12 +4,12 @@ import asyncio
 import contextlib
 import logging
 import random
-import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from typing import Protocol
 
+from station.clock import utc_ms
 from station.errors import StationError
 from station.messages import outbox as messages
 from station.messages.message import Message, message_of
@@ -66,7 +66,7 @@ class Publisher:
         self._oldest_utc_ms: int | None = None
         self._connected = False
         self._error: Message | None = messages.NOT_YET_CONNECTED()
-        self._away_since_utc_ms: int | None = time.time_ns() // 1_000_000
+        self._away_since_utc_ms: int | None = utc_ms()
 
     async def run(self) -> None:
         """Publish until cancelled."""
@@ -140,7 +140,7 @@ class Publisher:
         if connected:
             self._away_since_utc_ms = None
         elif self._away_since_utc_ms is None:
-            self._away_since_utc_ms = time.time_ns() // 1_000_000
+            self._away_since_utc_ms = utc_ms()
 
 
 def destinations(settings: OutboxSettings, home: Path) -> list[Destination]:

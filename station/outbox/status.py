@@ -1,11 +1,11 @@
 """Outbox status, in a small file that the station's metrics are made from."""
 
-import time
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from station.atomic_file import write_atomically
+from station.clock import utc_ms
 from station.messages.message import Message
 
 FOLDER_NAME = "outbox"
@@ -49,7 +49,7 @@ def write_status(folder: Path, destinations: dict[str, DestinationStatus]) -> No
     Raises:
         OSError: it cannot be written.
     """
-    status = OutboxStatus(utc_ms=time.time_ns() // 1_000_000, destinations=destinations)
+    status = OutboxStatus(utc_ms=utc_ms(), destinations=destinations)
     folder.mkdir(parents=True, exist_ok=True)
     write_atomically(folder / _FILE_NAME, status.model_dump_json().encode())
 

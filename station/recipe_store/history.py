@@ -5,10 +5,10 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import Connection, func, insert, select, update
 
+from station.clock import utc_ms
 from station.messages import recipes as messages
 from station.recipe_store.revision import STATUS, ConflictError, Origin, RecipeStoreError, Revision, Status
 from station.records.audit import AuditEntry, append_audit
-from station.records.clock import utc_ms
 from station.records.schema import recipe_revisions
 from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import content_sha256

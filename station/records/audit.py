@@ -7,10 +7,10 @@ from typing import Any
 
 from sqlalchemy import Connection, Row, bindparam, insert, select
 
+from station.clock import utc_ms
 from station.messages import records as messages
 from station.records.audit_head import FILE_NAME as HEAD_NAME
 from station.records.audit_head import Head
-from station.records.clock import utc_ms
 from station.records.errors import BadRecordError
 from station.records.schema import audit
 

@@ -13,10 +13,10 @@ from typing import BinaryIO
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from station.atomic_file import sync_folder
+from station.clock import utc_ms
 from station.messages import records as messages
 from station.records.audit import has_row, newer_head
 from station.records.audit_head import Head, read_head, signed_head
-from station.records.clock import utc_ms
 from station.records.database import FILE_NAME, open_engine, plain, reading
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, DiskFullError, RecordsError

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 from sqlalchemy import ColumnElement, Connection, Table, exists, insert, or_, select, update
 
+from station.clock import utc_ms
 from station.messages import records as messages
-from station.records.clock import utc_ms
 from station.records.errors import RecordsError
 from station.records.schema import holds, inspections
 

@@ -9,7 +9,7 @@ from station.charts.area_chart import report_style
 from station.charts.area_histogram import area_histogram
 from station.charts.report import data_uri, templates
 from station.charts.spark import spark
-from station.records.clock import utc_ms
+from station.clock import utc_ms
 from station.records.lot_summary import Example, LotSummary
 
 SUFFIX = ".html"

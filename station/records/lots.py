@@ -3,8 +3,8 @@
 from sqlalchemy import Connection, insert, select, update
 
 from station.channel.panel_queries import LotView
+from station.clock import utc_ms
 from station.messages import records as messages
-from station.records.clock import utc_ms
 from station.records.errors import RecordsError
 from station.records.schema import lots
 from station.records.write_requests import queue_event

@@ -5,8 +5,8 @@ from typing import Literal, NamedTuple
 from sqlalchemy import Connection, delete, select
 from sqlalchemy.dialects.sqlite import insert as upsert
 
+from station.clock import utc_ms
 from station.messages import records as messages
-from station.records.clock import utc_ms
 from station.records.errors import UnknownInspectionError
 from station.records.schema import inspections, marks
 

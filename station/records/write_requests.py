@@ -8,9 +8,9 @@ from pydantic import ValidationError
 from sqlalchemy import Connection, bindparam, delete, insert, select, update
 
 from station.channel.line import Outcome, Reason
+from station.clock import utc_ms
 from station.messages import records as messages
 from station.messages.message import Message, text_of
-from station.records.clock import utc_ms
 from station.records.errors import BadRecordError, UnknownInspectionError
 from station.records.model import AlarmEntry, AlarmRow, CurvePoint, InspectionRecord, Trigger
 from station.records.schema import (

@@ -13,16 +13,15 @@ import platform
 import shutil
 import subprocess
 import sys
-import time
 import urllib.request
 import zipfile
 from collections.abc import Callable, Iterator
-from datetime import UTC, datetime
 from http.client import HTTPException
 from importlib.metadata import distributions, version
 from pathlib import Path
 from typing import IO
 
+from station.clock import formatted, utc_ms
 from station.errors import StationError
 from station.records.database import reading, records_folder
 from station.records.last_backup import last_backup_utc_s
@@ -90,19 +89,15 @@ def _parts(site: Configuration, broken: str) -> Iterator[tuple[str, Callable[[],
 def _about(home: Path) -> str:
     disk = shutil.disk_usage(home)
     return (
-        f"made         {_time(time.time())}\n"
+        f"made         {formatted(utc_ms())}\n"
         f"station      {version('fruit-station')}\n"
         f"Python       {sys.version.split()[0]}\n"
         f"system       {platform.platform()}\n"
         f"processors   {os.cpu_count()}\n"
         f"home         {home}\n"
         f"disk         {disk.free / 1e9:.1f} GB free of {disk.total / 1e9:.1f} GB\n"
-        f"backup       {_time(last) if (last := last_backup_utc_s(home)) else 'never'}\n"
+        f"backup       {formatted(int(1000 * last)) if (last := last_backup_utc_s(home)) else 'never'}\n"
     )
-
-
-def _time(utc_s: float) -> str:
-    return f"{datetime.fromtimestamp(utc_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
 def _packages() -> str:

@@ -5,6 +5,7 @@ import logging
 import time
 from collections.abc import Iterable
 
+from station.clock import utc_ms
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import FrameFault
 from station.devices.gripper.errors import (
@@ -18,7 +19,6 @@ from station.inspection.alarms import CAUSED, Alarms
 from station.messages import alarm_commands as messages
 from station.messages.message import Message, message_in, message_of, text_of
 from station.messages.records import FAULT
-from station.records.clock import utc_ms
 from station.records.errors import RecordsError
 from station.records.model import AlarmEntry, AlarmRow
 from station.records.open import Notice

@@ -4,6 +4,7 @@ import time
 from dataclasses import dataclass, field
 
 from station.channel.line import Outcome
+from station.clock import utc_ms
 from station.inspection.centring import NOT_MOVED, Way
 from station.inspection.deadlines import Deadlines
 from station.inspection.judge import Judgement
@@ -13,7 +14,6 @@ from station.messages.message import Message
 from station.press.measurement import measured_point
 from station.press.rig import MeasuredStep, Step
 from station.press.stop import steps_to_decide
-from station.records.clock import utc_ms
 from station.records.first_press import first_press_findings, first_press_measures
 from station.records.judgement import judgement_measures
 from station.records.model import CurvePoint, Image, InspectionRecord, Trigger

@@ -7,13 +7,13 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping
 from functools import partial
 
 from station.channel.line import Begin, BeginReply, Outcome
+from station.clock import utc_ms
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import ACCEPTING, PLACING, REASONS, UNJUDGED, Action, Event, Raise
 from station.inspection.states import STATES, State
 from station.messages import operation as messages
 from station.messages.message import Message, message_of
-from station.records.clock import utc_ms
 from station.records.errors import RecordsError
 from station.records.model import Trigger
 from station.records.records import Records

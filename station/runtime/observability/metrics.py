@@ -23,6 +23,7 @@ from prometheus_client.exposition import choose_encoder
 from prometheus_client.registry import Collector
 
 from station.channel.line import Outcome
+from station.clock import utc_ms
 from station.inspection.alarm_table import ALARMS
 from station.outbox.status import OutboxStatus
 from station.records.records import Status
@@ -231,7 +232,7 @@ def _of_records(status: Status) -> Iterator[Metric]:
 
 def _of_outbox(status: OutboxStatus) -> Iterator[Metric]:
     """Yield the outbox's metrics."""
-    now_utc_ms = time.time_ns() // 1_000_000
+    now_utc_ms = utc_ms()
     told = status.destinations.items()
 
     def age_s(utc_ms: int | None) -> float:

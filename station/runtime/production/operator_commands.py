@@ -8,6 +8,7 @@ from collections import deque
 from station.channel.line import Command, CommandName
 from station.channel.panel import Recover, RecoveryName
 from station.channel.panel_live import LONGEST_LOT, OperatorCommand, OperatorCommandName, OperatorCommandView
+from station.clock import utc_ms
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.errors import StationError
 from station.inspection.cycle import UNJUDGED, WAITING
@@ -15,7 +16,6 @@ from station.inspection.states import State
 from station.messages import commands as messages
 from station.messages import lots
 from station.messages.message import Message, message_of
-from station.records.clock import utc_ms
 from station.records.errors import RecordsError
 from station.records.lots import end_lot, start_lot
 from station.records.records import Records

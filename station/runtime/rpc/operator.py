@@ -23,11 +23,11 @@ from station.channel.panel_live import (
     RecipeSummary,
 )
 from station.channel.server import Handlers
+from station.clock import utc_ms
 from station.inspection.states import STATES
 from station.messages import operation as messages
 from station.messages.message import Message, message_of
 from station.records.audit import AuditEntry
-from station.records.clock import utc_ms
 from station.records.errors import RecordsError
 from station.records.records import Records
 from station.runtime.alarms.commands import AlarmCommands

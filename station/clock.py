@@ -1,11 +1,11 @@
-"""Clock of the records."""
+"""Clock of what is stored and shown: the machine's, in UTC."""
 
 import time
 from datetime import UTC, datetime
 
 
 def utc_ms() -> int:
-    """Return the machine's clock, ms since 1970-01-01 UTC; for records, never for waits."""
+    """Return the machine's clock, ms since 1970-01-01 UTC; never for waits."""
     return time.time_ns() // 1_000_000
 
 
