@@ -10,6 +10,7 @@ import click
 from hmi.api.tokens import NAME, ROLES, ApiTokens
 from hmi.web.roles import Role
 from hmi.web.user_store import FOLDER
+from station.config_option import config_option
 from station.records.audit import AuditEntry, append_audit
 from station.records.database import records_folder
 from station.records.direct_transaction import direct_transaction
@@ -19,7 +20,6 @@ _ROLE = "command line"
 _BY = click.option(
     "--by", metavar="WHO", default=getpass.getuser, help="Who does it, for the audit trail. [default: your login]"
 )
-_CONFIG = click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
 
 
 @click.group("api-token")
@@ -40,7 +40,7 @@ def api_token() -> None:
     "--days", type=click.IntRange(1, 3650), metavar="N", help="Valid for so many days. [default: until it is removed]"
 )
 @_BY
-@_CONFIG
+@config_option
 def add(name: str, role: str, days: int | None, by: str, config: Path | None) -> None:
     """Create a token for the system NAME and print it, this once. It is valid at once."""
     if not re.match(NAME, name):
@@ -55,7 +55,7 @@ def add(name: str, role: str, days: int | None, by: str, config: Path | None) ->
 
 
 @api_token.command("list")
-@_CONFIG
+@config_option
 def list_all(config: Path | None) -> None:
     """List the tokens by their names; the tokens themselves are not stored."""
     for name, token in sorted(ApiTokens(load_configuration(config).home / FOLDER).all().items()):
@@ -66,7 +66,7 @@ def list_all(config: Path | None) -> None:
 @api_token.command()
 @click.argument("name")
 @_BY
-@_CONFIG
+@config_option
 def remove(name: str, by: str, config: Path | None) -> None:
     """Withdraw the token of the system NAME; its next request is refused."""
     home = load_configuration(config).home

@@ -8,6 +8,7 @@ import click
 from hmi.web.roles import Role
 from hmi.web.text import texts
 from hmi.web.user_store import FOLDER, UserStore, UserStoreError
+from station.config_option import config_option
 from station.errors import BadInputError
 from station.records.audit import AuditEntry, append_audit
 from station.records.database import records_folder
@@ -20,7 +21,7 @@ from station.settings.configuration import load_configuration
 @click.option(
     "--by", metavar="WHO", default=getpass.getuser, help="Who does it, for the audit trail. [default: your login]"
 )
-@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@config_option
 def administrator(name: str, by: str, config: Path | None) -> None:
     """Make NAME the first person who may log in, and ask for the PIN.
 

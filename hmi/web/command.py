@@ -6,13 +6,14 @@ from pathlib import Path
 import click
 
 from hmi.web.process import serve
+from station.config_option import config_option
 from station.logs import configure_logging
 from station.settings.configuration import configuration_file
 from station.settings.last_good import load_or_last_good
 
 
 @click.command("hmi")
-@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@config_option
 def hmi(config: Path | None) -> None:
     """Serve the operators' pages until SIGTERM or Ctrl-C; `station run` starts this by itself.
 

@@ -14,6 +14,7 @@ from plc_interface.plc_simulator.program import LineProgram
 from plc_interface.plc_simulator.scan import Scanner
 from plc_interface.plc_simulator.simulator import LineSimulator, Pace
 from plc_interface.registers.codec import WordOrder
+from station.config_option import config_option
 from station.errors import BadInputError, StationError
 from station.settings.configuration import load_configuration
 from station.settings.recipe import load_recipes
@@ -22,7 +23,7 @@ _ENDING_S = 0.5
 
 
 @click.command("line")
-@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@config_option
 @click.option("--count", type=click.IntRange(min=1), help="End after so many fruits; else Ctrl-C ends it.")
 @click.option(
     "--every",

@@ -8,6 +8,7 @@ import click
 from plc_interface.outputs.can.command import check_can
 from plc_interface.process.process import serve
 from plc_interface.registers.generate.files import DOCUMENTS, drifted_files, write_files
+from station.config_option import config_option
 from station.errors import StationError
 from station.logs import configure_logging
 from station.settings.last_good import load_or_last_good
@@ -22,7 +23,7 @@ plc.add_command(check_can)
 
 
 @plc.command("run")
-@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@config_option
 def run(config: Path | None) -> None:
     """Serve the line's PLC until Ctrl-C: registers, handshake, and the reject gate where CAN is enabled.
 

@@ -18,8 +18,9 @@ from station.channel.panel import (
     UnshelveAlarm,
 )
 from station.clock import formatted
-from station.commands.records_options import by_option, config_option
+from station.commands.records_options import by_option
 from station.commands.site import site_or_last_good
+from station.config_option import config_option
 from station.errors import StationError
 from station.inspection.alarms import LONGEST_SHELVED_S
 from station.records.texts import printable

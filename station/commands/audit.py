@@ -4,7 +4,8 @@ from pathlib import Path
 
 import click
 
-from station.commands.records_options import config_option, folder_of, proof_options
+from station.commands.records_options import folder_of, proof_options
+from station.config_option import config_option
 from station.errors import BadInputError
 from station.records.audit_check import Proof, check_trail
 from station.records.audit_report import format_rows, read_audit

@@ -18,10 +18,9 @@ from station.calibration.store import PAGE, CalibrationStore
 from station.commands.calibration_rig import cancelled_by_signals, open_rig, show
 from station.commands.calibration_storage import store_calibration
 from station.commands.simulated_unit import calibrate_simulated_unit
+from station.config_option import config_option
 from station.errors import BadInputError
 from station.settings.configuration import Configuration, load_configuration
-
-_CONFIG = click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
 
 
 class _PlaceType(click.ParamType):
@@ -54,7 +53,7 @@ class _PlaceType(click.ParamType):
 )
 @click.option("--bench", is_flag=True, help="No arm: the ball is held between the fingers.")
 @click.option("--yes", is_flag=True, help="Do not ask: the ball lies there, and at each place when its turn comes.")
-@_CONFIG
+@config_option
 @click.pass_context
 def calibrate(
     context: click.Context,
@@ -119,7 +118,7 @@ def _print_progress(checks: tuple[Check, ...]) -> None:
 
 
 @calibrate.command("simulated")
-@_CONFIG
+@config_option
 def simulated_command(config: Path | None) -> None:
     """Calibrate the twin's sensor if it never was, in a few seconds: on a drawn ball at three places.
 
@@ -136,7 +135,7 @@ def simulated_command(config: Path | None) -> None:
 
 
 @calibrate.command("list")
-@_CONFIG
+@config_option
 def list_command(config: Path | None) -> None:
     """List the calibrations of every unit, the newest first."""
     store = CalibrationStore(load_configuration(config).home)
@@ -154,7 +153,7 @@ def list_command(config: Path | None) -> None:
 
 @calibrate.command("show")
 @click.argument("name", metavar="ID")
-@_CONFIG
+@config_option
 def show_command(name: str, config: Path | None) -> None:
     """Show one calibration: its numbers, its checks, and the path of its page."""
     store = CalibrationStore(load_configuration(config).home)

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from station.atomic_file import write_atomically
+from station.config_option import config_option
 from station.messages import settings as messages
 from station.settings.conduits import Zone
 from station.settings.configuration import load_configuration
@@ -14,13 +15,6 @@ from station.settings.file_content import read_content
 from station.settings.firewall import rules
 from station.settings.migration import migrated
 from station.settings.problems import Problem, SettingsError
-
-_config = click.option(
-    "--config",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="The configuration. [default: STATION_CONFIG, or station.yaml in STATION_HOME]",
-)
 
 
 def _networks(_context: click.Context, _option: click.Parameter, given: tuple[str, ...]) -> tuple[str, ...]:
@@ -47,7 +41,7 @@ def config() -> None:
 
 
 @config.command()
-@_config
+@config_option
 def check(config: Path | None) -> None:
     """Check the configuration with its environment variables, and report all errors."""
     site = load_configuration(config)
@@ -55,7 +49,7 @@ def check(config: Path | None) -> None:
 
 
 @config.command()
-@_config
+@config_option
 def show(config: Path | None) -> None:
     """Show the configuration in force, as JSON: defaults, overridden by the file, overridden by the environment."""
     click.echo(load_configuration(config).model_dump_json(indent=2))
@@ -79,7 +73,7 @@ def migrate(file: Path, *, write: bool) -> None:
 
 
 @config.command()
-@_config
+@config_option
 @click.option(
     "--zone", "zones", metavar="NAME=ADDRESS,…", multiple=True, callback=_zones,
     help="Addresses or networks of a zone: cell, line, operators, monitoring, archive. May be repeated.",

@@ -12,6 +12,7 @@ from station.channel.line import CommandDone, Open, Resume
 from station.channel.messages import DeadlineError
 from station.channel.panel import Recover, RecoveryName
 from station.commands.site import site_or_last_good
+from station.config_option import config_option
 from station.devices.arm.faults import ArmFault
 from station.devices.arm.probe import probe_arm
 from station.devices.arm.ur import UrArm
@@ -34,7 +35,7 @@ def devices() -> None:
 
 
 @devices.command("check")
-@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@config_option
 @click.option("--bench", is_flag=True, help="No arm.")
 def check(config: Path | None, bench: bool) -> None:  # noqa: FBT001 (click passes arguments by name)
     """Check every device's identity and state; nothing is moved.
@@ -54,7 +55,7 @@ def check(config: Path | None, bench: bool) -> None:  # noqa: FBT001 (click pass
 
 @devices.command("recover")
 @click.argument("what", type=click.Choice(get_args(RecoveryName)))
-@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@config_option
 @click.option("--yes", is_flag=True, help="Do not ask: a person has looked.")
 def recover(what: RecoveryName, config: Path | None, yes: bool) -> None:  # noqa: FBT001
     """Recover the arm after a stop, once a person has checked the cell.

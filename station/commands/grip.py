@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from station.config_option import config_option
 from station.devices.arm.ur import UrArm
 from station.devices.camera.interface import Camera, Image
 from station.devices.camera.open import camera_from
@@ -34,7 +35,7 @@ _COLUMNS = ("image", "width_mm", "commanded_width_mm", "object_state", "current_
 @click.command("grip")
 @click.option("--recipe", "recipe_name", required=True, metavar="NAME", help="Recipe, by name or file.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder for the frames; must not exist.")
-@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@config_option
 @click.option("--bench", is_flag=True, help="No arm: the fruit is already between the fingers.")
 def grip(recipe_name: str, out: Path, config: Path | None, bench: bool) -> None:  # noqa: FBT001 (click's way)
     """Grip one fruit by a recipe's width steps, without a judgement. The arm and the gripper move.

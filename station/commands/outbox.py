@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from station.commands.records_options import config_option
+from station.config_option import config_option
 from station.errors import StationError
 from station.logs import configure_logging
 from station.outbox.lag import LOST_S

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from station.clock import formatted
+from station.config_option import config_option
 from station.errors import BadInputError
 from station.recipe_store.difference import differences
 from station.recipe_store.editor import RecipeEditor
@@ -23,12 +24,6 @@ from station.settings.yaml_loader import parse_document
 
 Command = Callable[..., Any]
 
-_config = click.option(
-    "--config",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="The configuration that names the folders. [default: STATION_CONFIG, or station.yaml in STATION_HOME]",
-)
 _revision = click.option("--revision", metavar="N", type=click.IntRange(1), help="Which revision.")
 _base = click.option(
     "--base", default="", metavar="HASH", help="The content hash, or 8 of its digits, of what the change is made to."
@@ -49,7 +44,7 @@ def recipes() -> None:
 
 @recipes.command()
 @click.argument("files", metavar="[FILE]...", nargs=-1, type=click.Path(path_type=Path))
-@_config
+@config_option
 @click.pass_context
 def check(context: click.Context, files: tuple[Path, ...], config: Path | None) -> None:
     """Check recipe files, and report all their errors.
@@ -70,7 +65,7 @@ def check(context: click.Context, files: tuple[Path, ...], config: Path | None) 
 
 
 @recipes.command("list")
-@_config
+@config_option
 def list_all(config: Path | None) -> None:
     """List the recipes: the revision in force, the state of the file, and drafts that wait for approval."""
     store = _store(config)
@@ -89,7 +84,7 @@ def list_all(config: Path | None) -> None:
 @recipes.command()
 @click.argument("name")
 @_revision
-@_config
+@config_option
 def show(name: str, revision: int | None, config: Path | None) -> None:
     """Show a recipe's file, or the text of one of its revisions, unchanged."""
     store = _store(config)
@@ -98,7 +93,7 @@ def show(name: str, revision: int | None, config: Path | None) -> None:
 
 @recipes.command()
 @click.argument("name")
-@_config
+@config_option
 def history(name: str, config: Path | None) -> None:
     """Show a recipe's revisions: author, approver, retirement, times, reasons and changes."""
     store = _store(config)
@@ -113,7 +108,7 @@ def history(name: str, config: Path | None) -> None:
 @click.argument("name")
 @click.option("--from", "old", metavar="N", type=click.IntRange(1), help="A revision. [default: the approved one]")
 @click.option("--to", "new", metavar="N", type=click.IntRange(1), help="A revision. [default: the file]")
-@_config
+@config_option
 def diff(name: str, old: int | None, new: int | None, config: Path | None) -> None:
     """Show every value that differs between two revisions, or between the approved one and the file."""
     store = _store(config)
@@ -130,7 +125,7 @@ def diff(name: str, old: int | None, new: int | None, config: Path | None) -> No
 
 
 @recipes.command()
-@_config
+@config_option
 def adopt(config: Path | None) -> None:
     """Start the history, as the station's first start does: existing recipes count as approved. Idempotent."""
     store = _store(config)
@@ -146,7 +141,7 @@ def adopt(config: Path | None) -> None:
 )
 @_base
 @_person
-@_config
+@config_option
 def edit(name: str, changes: tuple[str, ...], base: str, who: str, role: str, reason: str, config: Path | None) -> None:
     """Change values in a recipe's file; comments remain. The file is then an unapproved draft: submit it.
 
@@ -160,7 +155,7 @@ def edit(name: str, changes: tuple[str, ...], base: str, who: str, role: str, re
 @recipes.command()
 @click.argument("name")
 @_person
-@_config
+@config_option
 def submit(name: str, who: str, role: str, reason: str, config: Path | None) -> None:
     """Record a recipe's file as a draft, for another person to approve."""
     made = _store(config).submit(name, Person(who, role, reason))
@@ -171,7 +166,7 @@ def submit(name: str, who: str, role: str, reason: str, config: Path | None) -> 
 @click.argument("name")
 @_revision
 @_person
-@_config
+@config_option
 def approve(name: str, revision: int | None, who: str, role: str, reason: str, config: Path | None) -> None:
     """Put a draft in force: the next lot is inspected by it. Its author cannot do this."""
     made = _store(config).approve(name, Person(who, role, reason), revision)
@@ -182,7 +177,7 @@ def approve(name: str, revision: int | None, who: str, role: str, reason: str, c
 @click.argument("name")
 @_revision
 @_person
-@_config
+@config_option
 def retire(name: str, revision: int | None, who: str, role: str, reason: str, config: Path | None) -> None:
     """Take a revision out of use, the approved one by default; a draft is rejected by this."""
     made = _store(config).retire(name, Person(who, role, reason), revision)
@@ -193,7 +188,7 @@ def retire(name: str, revision: int | None, who: str, role: str, reason: str, co
 @click.argument("name")
 @_revision
 @_person
-@_config
+@config_option
 def revert(name: str, revision: int | None, who: str, role: str, reason: str, config: Path | None) -> None:
     """Put the approved revision's text, or another's, back into the file; the present text is stored as a backup."""
     click.echo(_line(_editor(config).revert(name, Person(who, role, reason), revision)))
@@ -203,7 +198,7 @@ def revert(name: str, revision: int | None, who: str, role: str, reason: str, co
 @click.argument("name")
 @_revision
 @click.option("--out", metavar="FILE", type=click.Path(path_type=Path), help="[default: standard output]")
-@_config
+@config_option
 def export_one(name: str, revision: int | None, out: Path | None, config: Path | None) -> None:
     """Write a recipe with a first line that names its version, to edit it elsewhere and import it again."""
     text = _store(config).export_text(name, revision)
@@ -220,7 +215,7 @@ def export_one(name: str, revision: int | None, out: Path | None, config: Path |
 @click.argument("file", type=click.Path(path_type=Path))
 @_base
 @_person
-@_config
+@config_option
 def import_one(file: Path, base: str, who: str, role: str, reason: str, config: Path | None) -> None:
     """Replace the recipe's file by FILE. It is then an unapproved draft: submit it.
 
@@ -235,7 +230,7 @@ def import_one(file: Path, base: str, who: str, role: str, reason: str, config: 
 
 @recipes.command()
 @_person
-@_config
+@config_option
 def upgrade(who: str, role: str, reason: str, config: Path | None) -> None:
     """Convert files of an earlier schema to this program's, comments included, with a backup. Idempotent."""
     done = _editor(config).upgrade(Person(who, role, reason))

@@ -6,8 +6,9 @@ import click
 
 from station.commands.records_maintenance import backup, check, hold, holds, lot, release, restore
 from station.commands.records_marks import mark, marks
-from station.commands.records_options import config_option, folder_of, query_options
+from station.commands.records_options import folder_of, query_options
 from station.commands.records_output import export, report
+from station.config_option import config_option
 from station.records.database import reading
 from station.records.open import set_mark
 from station.records.queries import Summary, read_inspection

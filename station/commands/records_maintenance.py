@@ -6,8 +6,9 @@ import click
 
 from station.channel.panel_queries import LotView
 from station.clock import formatted
-from station.commands.records_options import by_option, config_option, folder_of, proof_options, public_keys_option
+from station.commands.records_options import by_option, folder_of, proof_options, public_keys_option
 from station.commands.site import site_or_last_good
+from station.config_option import config_option
 from station.errors import StationError
 from station.records.audit import AuditEntry, append_audit
 from station.records.audit_check import Proof

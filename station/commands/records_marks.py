@@ -5,7 +5,8 @@ from pathlib import Path
 import click
 
 from station.clock import formatted
-from station.commands.records_options import by_option, config_option, folder_of
+from station.commands.records_options import by_option, folder_of
+from station.config_option import config_option
 from station.records.audit import AuditEntry, append_audit
 from station.records.database import reading
 from station.records.marks import Mark, place_mark, read_marked

@@ -17,13 +17,6 @@ from station.records.search import Query
 from station.records.signing import read_public_key
 from station.settings.configuration import load_configuration
 
-config_option = click.option(
-    "--config",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="The configuration that names the home folder. [default: STATION_CONFIG, or station.yaml in STATION_HOME]",
-)
-
 
 def folder_of(config: Path | None) -> Path:
     """Return the records' folder of the configuration's file that the user named."""

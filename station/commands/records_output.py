@@ -4,7 +4,8 @@ from pathlib import Path
 
 import click
 
-from station.commands.records_options import config_option, folder_of, query_options
+from station.commands.records_options import folder_of, query_options
+from station.config_option import config_option
 from station.records.error_mapping import map_error
 from station.records.export import SUFFIXES
 from station.records.export import export as write_export

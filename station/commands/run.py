@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from station.config_option import config_option
 from station.settings.configuration import Configuration
 from station.settings.hmi import address_of
 from station.settings.last_good import load_or_last_good
@@ -16,7 +17,7 @@ from station.supervision.supervisor import Supervisor
 
 
 @click.command("run")
-@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@config_option
 def run(config: Path | None) -> None:
     """Run the station until Ctrl-C: the service, the PLC interface and the pages, each a process of its own.
 

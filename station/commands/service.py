@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from station.config_option import config_option
 from station.logs import configure_logging
 from station.memory import keep_freed_memory
 from station.runtime.station import Station
@@ -14,7 +15,7 @@ from station.settings.last_good import load_or_last_good
 
 
 @click.command("service")
-@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@config_option
 @click.option(
     "--log",
     "style",

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from station.config_option import config_option
 from station.errors import BadInputError, StationError
 from station.records.database import reading, records_folder
 from station.records.marks import Mark, read_marked
@@ -40,7 +41,7 @@ _PART = 500
 )  # fmt: skip
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Where the results go.")
 @click.option("--draft", type=click.Path(path_type=Path), metavar="FILE", help="Write a recipe with the limit too.")
-@click.option("--config", metavar="FILE", type=click.Path(path_type=Path), help="The station.yaml to use.")
+@config_option
 def thresholds(
     name: str,
     marks: Path | None,

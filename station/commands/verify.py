@@ -13,6 +13,7 @@ from station.calibration.report import verification_files
 from station.calibration.store import PAGE, CalibrationStore
 from station.calibration.verification_procedure import VerificationProcedure, VerificationResult
 from station.commands.calibration_rig import cancelled_by_signals, open_rig, show
+from station.config_option import config_option
 from station.errors import StationError
 from station.records.audit import append_audit
 from station.records.database import records_folder
@@ -25,7 +26,7 @@ from station.settings.configuration import Configuration, load_configuration
 @click.option("--operator", default=getpass.getuser, show_default="the user", help="Who verifies.")
 @click.option("--bench", is_flag=True, help="No arm: the ball is held between the fingers.")
 @click.option("--yes", is_flag=True, help="Do not ask: the ball lies there.")
-@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@config_option
 def verify(operator: str, bench: bool, yes: bool, config: Path | None) -> None:  # noqa: FBT001 (click's way)
     """Verify the sensor with the ball against its calibration: PASS or FAIL. The gripper closes on the ball.
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from station.config_option import config_option
 from station.errors import BadInputError, StationError
 from station.recipe_store.difference import differences
 from station.records.database import reading, records_folder
@@ -29,7 +30,7 @@ from station.whatif.stored import sequences, snapshots
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Where the results go.")
 @click.option("--jobs", type=click.IntRange(1, 512), metavar="N", help="Processes. [default: one for each core]")
 @click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler's address, as tcp://10.0.0.5:8786.")
-@click.option("--config", metavar="FILE", type=click.Path(path_type=Path), help="The station.yaml to use.")
+@config_option
 def whatif(
     recipe_name: str,
     lots: tuple[str, ...],

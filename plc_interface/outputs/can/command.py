@@ -9,6 +9,7 @@ import click
 from plc_interface.outputs.can import bring_up
 from plc_interface.outputs.can.errors import BringUpError, LineIoError
 from plc_interface.outputs.can.link import STATES, CanLink, described
+from station.config_option import config_option
 from station.messages.message import Message
 from station.settings.can import CanSettings
 from station.settings.configuration import load_configuration
@@ -18,7 +19,7 @@ _POLL_S = 0.02
 
 
 @click.command("check-can")
-@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="The station.yaml to use.")
+@config_option
 def check_can(config: Path | None) -> None:
     """Read the identity of the CAN nodes; nothing is moved or written. Only while the station is stopped.
 
