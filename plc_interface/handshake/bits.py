@@ -2,7 +2,7 @@
 
 from plc_interface.handshake.actions import ClearFaults
 from plc_interface.handshake.modes import Arming, Lot, Service, Signal
-from plc_interface.handshake.state import COUNTERS, Fault
+from plc_interface.handshake.state import HANDSHAKE_COUNTERS, Fault
 from plc_interface.handshake.work import Row, Work, described, row
 
 silent = described("Fault: PLC's heartbeat lost.", lambda work: work.fault(Fault.PLC_SILENT))
@@ -33,7 +33,7 @@ def clear(work: Work) -> None:
 
 def reset(work: Work) -> None:
     """Counters to 0, epoch raised."""
-    work.state.counters = dict.fromkeys(COUNTERS, 0)
+    work.state.counters = dict.fromkeys(HANDSHAKE_COUNTERS, 0)
     work.state.reset_utc_ms = work.at.utc_ms
     work.update_journal(epoch=(work.state.journal.epoch + 1) % 2**32)
 

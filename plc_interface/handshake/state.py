@@ -45,7 +45,7 @@ class Size(NamedTuple):
 NO_SIZE = Size()
 
 
-COUNTERS = (
+HANDSHAKE_COUNTERS = (
     "count_triggers",
     "count_accepted",
     "count_pass",
@@ -131,7 +131,7 @@ class State:
     command_request: int | None = None
     command_changes_recipe: bool = False
 
-    counters: Mapping[str, int] = field(default_factory=lambda: dict.fromkeys(COUNTERS, 0))
+    counters: Mapping[str, int] = field(default_factory=lambda: dict.fromkeys(HANDSHAKE_COUNTERS, 0))
     reset_utc_ms: int
     unlisted: int = 0
     """Pairs of mode and signal that came and are not in the table: refused."""

@@ -143,7 +143,7 @@ class OpenInspections:
 
 
 @dataclass(frozen=True, slots=True)
-class AlarmRow:
+class StoredAlarm:
     """An alarm that is not in its normal state, as stored for the next start."""
 
     id: str

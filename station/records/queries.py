@@ -16,12 +16,12 @@ from station.records.errors import UnknownInspectionError
 from station.records.images import image_path
 from station.records.model import (
     AlarmEntry,
-    AlarmRow,
     CurvePoint,
     FullRecord,
     InspectionRecord,
     OpenInspections,
     RecipeSnapshot,
+    StoredAlarm,
     StoredImage,
     Trigger,
 )
@@ -62,10 +62,10 @@ def read_open(connection: Connection) -> OpenInspections:
     )
 
 
-def read_alarms(connection: Connection) -> tuple[AlarmRow, ...]:
+def read_alarms(connection: Connection) -> tuple[StoredAlarm, ...]:
     """Read the alarms that were saved last, by their ids."""
     rows = connection.execute(select(alarms).order_by(alarms.c.id))
-    return tuple(AlarmRow(**dict[str, Any](row)) for row in rows.mappings())
+    return tuple(StoredAlarm(**dict[str, Any](row)) for row in rows.mappings())
 
 
 def read_alarm_log(connection: Connection, limit: int) -> tuple[AlarmEntry, ...]:

@@ -22,7 +22,7 @@ from station.records.database import FILE_NAME, check, reading
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, DiskFullError, RecordsClosedError, RecordsDeadlineError, RecordsError
 from station.records.images import MB, accepted_is_stored
-from station.records.model import AlarmEntry, AlarmRow, FullRecord, InspectionRecord, OpenInspections, Trigger
+from station.records.model import AlarmEntry, FullRecord, InspectionRecord, OpenInspections, StoredAlarm, Trigger
 from station.records.open import NOTICE_NAME, Notice, Opened, lock_folder, open_records
 from station.records.queries import read_alarms, read_inspection, read_open
 from station.records.write_requests import (
@@ -301,11 +301,11 @@ class Records:
         """
         return await self._read(lambda connection: read_inspection(connection, sequence, self.folder))
 
-    async def save_alarms(self, active: Sequence[AlarmRow], log: Sequence[AlarmEntry] = ()) -> None:
+    async def save_alarms(self, active: Sequence[StoredAlarm], log: Sequence[AlarmEntry] = ()) -> None:
         """Replace the stored alarms and append to their log in one transaction, without a deadline."""
         await self.change_to_end(lambda connection: replace_alarms(connection, active, log))
 
-    async def load_alarms(self) -> tuple[AlarmRow, ...]:
+    async def load_alarms(self) -> tuple[StoredAlarm, ...]:
         """Return the alarms that were saved last."""
         return await self._ask(read_alarms)
 

@@ -12,7 +12,7 @@ from station.clock import utc_ms
 from station.messages import records as messages
 from station.messages.message import Message, text_of
 from station.records.errors import BadRecordError, UnknownInspectionError
-from station.records.model import AlarmEntry, AlarmRow, CurvePoint, InspectionRecord, Trigger
+from station.records.model import AlarmEntry, CurvePoint, InspectionRecord, StoredAlarm, Trigger
 from station.records.schema import (
     alarms,
     alarms_log,
@@ -206,7 +206,7 @@ def end_open_inspections(connection: Connection) -> list[int]:
     return [row.sequence for row in rows]
 
 
-def replace_alarms(connection: Connection, active: Sequence[AlarmRow], log: Sequence[AlarmEntry]) -> None:
+def replace_alarms(connection: Connection, active: Sequence[StoredAlarm], log: Sequence[AlarmEntry]) -> None:
     """Store these alarms and no others, and append to the log."""
     connection.execute(delete(alarms))
     if active:

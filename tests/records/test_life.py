@@ -13,7 +13,7 @@ from station.channel.line import Outcome, Reason
 from station.messages import records as messages
 from station.records.errors import BadRecordError, LockedError, RecordsClosedError, UnknownInspectionError
 from station.records.lots import read_lots, start_lot
-from station.records.model import AlarmEntry, AlarmRow
+from station.records.model import AlarmEntry, StoredAlarm
 from tests.records.causes import because
 
 
@@ -256,11 +256,14 @@ def test_clock_steps_change_no_order_and_no_duration(opened, scenario, trigger, 
 
 
 def test_alarms_and_events_outlive_a_restart(opened, scenario, folder):
-    rows = (AlarmRow("camera_lost", "unacknowledged", 5, 6, "USB"), AlarmRow("disk_full", "shelved", 7, 8, "", 99))
+    rows = (
+        StoredAlarm("camera_lost", "unacknowledged", 5, 6, "USB"),
+        StoredAlarm("disk_full", "shelved", 7, 8, "", 99),
+    )
 
     async def steps():
         async with opened() as records:
-            await records.save_alarms([AlarmRow("old", "active", 1, 1)])
+            await records.save_alarms([StoredAlarm("old", "active", 1, 1)])
             await records.save_alarms(rows, [AlarmEntry(5, "camera_lost", "raised", "USB", 3)])
         async with opened() as records:
             assert await records.load_alarms() == rows

@@ -20,7 +20,7 @@ from station.messages import alarm_commands as messages
 from station.messages.message import Message, message_in, message_of, text_of
 from station.messages.records import FAULT
 from station.records.errors import RecordsError
-from station.records.model import AlarmEntry, AlarmRow
+from station.records.model import AlarmEntry, StoredAlarm
 from station.records.open import Notice
 from station.records.records import Records
 from station.runtime.devices.manager import ARM, CAMERA, GRIPPER
@@ -214,7 +214,7 @@ class AlarmManager:
                 continue
             entries, self._unsaved = tuple(self._unsaved), []
             rows = tuple(
-                AlarmRow(
+                StoredAlarm(
                     alarm.id,
                     alarm.state,
                     round(1000 * alarm.since_s),

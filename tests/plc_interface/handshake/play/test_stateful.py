@@ -25,7 +25,7 @@ from plc_interface.handshake import events as ev
 from plc_interface.handshake.journal import Journal
 from plc_interface.handshake.machine import step
 from plc_interface.handshake.modes import Arming, Link, Result
-from plc_interface.handshake.state import COUNTERS, Fault, State, restarted
+from plc_interface.handshake.state import HANDSHAKE_COUNTERS, Fault, State, restarted
 from plc_interface.handshake.view import lot_checksum, view
 from plc_interface.registers.map import BY_NAME
 from station.settings.plc import HandshakeSettings
@@ -414,7 +414,7 @@ class Handshake(RuleBasedStateMachine):
                 assert not any(map(self.bit, ("missed", "overrun")))
                 assert (self.seen["last_refusal"], self.state.faults) == (0, ())
             case "reset_counters":
-                assert {self.seen[counter] for counter in COUNTERS} == {0}
+                assert {self.seen[counter] for counter in HANDSHAKE_COUNTERS} == {0}
                 assert self.seen["counters_epoch"] == (epoch + 1) % 2**32
             case "offline":
                 assert not any(map(self.bit, ("online", "trigger_ready")))
