@@ -7,7 +7,7 @@ from plc_interface.handshake.modes import Arming, Command, Inspection, Link, Lot
 from plc_interface.handshake.state import State
 from plc_interface.handshake.trigger import obstacle
 from plc_interface.registers.alarms import alarm_values
-from plc_interface.registers.map import BY_NAME
+from plc_interface.registers.map import BY_NAME, RESULT
 from plc_interface.registers.register import Value
 from station.channel.line import PACKML_STATE_NUMBERS, Line, LineFault, Outcome, StationState
 
@@ -140,28 +140,7 @@ def result_values(outcome: Outcome) -> dict[str, Value]:
     }
 
 
-_NO_RESULT: dict[str, Value] = {
-    "result_sequence": 0,
-    "result_trigger_id": 0,
-    "result_flags": 0,
-    "result_reasons": 0,
-    "result_area_mm2_x100": None,
-    "result_area_mm2": None,
-    "result_area_px": None,
-    "result_closing_mm_x100": None,
-    "result_confidence_pct": None,
-    "result_recipe": 0,
-    "result_outcome": 0,
-    "result_recipe_checksum": 0,
-    "result_ended_utc_ms": 0,
-    "result_duration_ms": 0,
-    "result_encoder": 0,
-    "result_lot_checksum": 0,
-    "result_sequence_again": 0,
-    "result_fruit_length_mm_x10": 0,
-    "result_size_class": 0,
-    "result_sequence_end": 0,
-}
+_NO_RESULT: dict[str, Value] = {register.name: 0 if register.invalid is None else None for register in RESULT}
 
 
 def lot_checksum(lot: str) -> int:
