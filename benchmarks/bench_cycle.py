@@ -45,10 +45,11 @@ from station.commands.simulated_unit import calibrate_simulated_unit
 from station.devices.arm.ur import UrArm
 from station.devices.camera.open import camera_from
 from station.devices.gripper.robotiq import make_gripper
+from station.press.rig import FINEST_STEP_MM
 from station.press.stop import MOST_UNSEEN_MM
 from station.records.model import FullRecord
 from station.records.records import Records
-from station.runtime.devices.rig import FINEST_STEP_MM, Cell, DeviceRig, at_once
+from station.runtime.devices.rig import Cell, DeviceRig, at_once
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.plc import line_endpoint
 from station.settings.recipe import Recipe, load_recipes

@@ -6,7 +6,8 @@ import numpy as np
 
 from station.calibration.rig import Place
 from station.messages.message import Message
-from station.press.rig import Position
+from station.press.rig import FINEST_STEP_MM, Position
+from station.settings.gripper import GripperCalibration
 from station.twin.contact import FruitOnGel, Pose
 from station.twin.digit.sensor import Condition, DigitSensor, Image
 from station.twin.fruit import Kind, draw_fruit
@@ -15,8 +16,7 @@ from station.twin.squeeze import Squeeze
 
 _HOLDER_MM = 18.0
 _FRAME_S, _STEP_S = 1 / 30, 1.3
-_COUNT_MM = 85 / 227
-_CLOSED_COUNT, _FINGERS_MM = 230, 32.0
+_GRIPPER = GripperCalibration()
 
 
 class SimulatedFrame(NamedTuple):
@@ -58,7 +58,7 @@ class SimulatedRig(StationaryRig):
     """
 
     widest_mm = 53.0
-    finest_step_mm = 0.4
+    finest_step_mm = FINEST_STEP_MM
 
     def __init__(
         self,
@@ -91,8 +91,9 @@ class SimulatedRig(StationaryRig):
 
     async def close_to(self, width_mm: float) -> Position:
         """Move to the nearest count of the gripper; the time of a whole step passes."""
-        count = round(_CLOSED_COUNT - (width_mm + _FINGERS_MM) / _COUNT_MM)
-        self._width_mm = (_CLOSED_COUNT - count) * _COUNT_MM - _FINGERS_MM
+        closed, count_mm, fingers_mm = _GRIPPER.closed_count, _GRIPPER.mm_per_count, _GRIPPER.finger_offset_mm
+        count = round(closed - (width_mm + fingers_mm) / count_mm)
+        self._width_mm = (closed - count) * count_mm - fingers_mm
         self._now_s += _STEP_S
         return Position(self._width_mm)
 

@@ -13,13 +13,11 @@ from station.devices.gripper.interface import Gripper, GripperReading, MoveResul
 from station.errors import StationError
 from station.messages import grip as messages
 from station.messages.message import Definition, Message
-from station.press.rig import GripError, Position
+from station.press.rig import FINEST_STEP_MM, GripError, Position
 from station.settings.arm import PoseName
 from station.settings.recipe import Recipe
 
 FRAME_DEADLINE_S = 1.0
-FINEST_STEP_MM = 0.4
-"""A count of the gripper."""
 _MOST_FAULTY_FRAMES = 10
 _HEALTH_LEASE_S = 2.0
 
