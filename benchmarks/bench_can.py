@@ -87,7 +87,7 @@ async def measure(settings: CanSettings) -> list[list[str]]:
             if count is None:
                 raise TimeoutError("the encoder is silent")
             try:
-                shots_s.append((await io.divert(sequence, 1, further(count.value, AHEAD_COUNTS))).confirmed_s)
+                shots_s.append((await io.divert(sequence, 1, further(count, AHEAD_COUNTS))).confirmed_s)
             except LateRejectError:  # this machine stood still for longer than the belt took
                 missed += 1
         bare_s = await asyncio.to_thread(bare, settings)

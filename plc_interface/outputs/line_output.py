@@ -118,9 +118,9 @@ class RejectGate:
 
     def _is_too_far(self, sequence: int, at_count: int) -> bool:
         count = self._io.encoder_count()
-        if count is None or ahead(count.value, at_count) <= self._distance:
+        if count is None or ahead(count, at_count) <= self._distance:
             return False
-        error = RejectRefusedError(sequence, messages.COUNT_TOO_FAR(at_count=at_count, now_count=count.value))
+        error = RejectRefusedError(sequence, messages.COUNT_TOO_FAR(at_count=at_count, now_count=count))
         log.warning("inspection %d was not diverted by CAN: %s", sequence, error)
         self._io.give_up(error)
         return True
@@ -132,8 +132,7 @@ class RejectGate:
 
     def encoder_count(self) -> int | None:
         """Return the last count of the encoder on the bus; None if the PLC's is to be used."""
-        count = self._io.encoder_count()
-        return None if count is None else count.value
+        return self._io.encoder_count()
 
     @property
     def faults(self) -> tuple[LineFault, ...]:

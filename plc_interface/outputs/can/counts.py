@@ -1,16 +1,6 @@
 """Arithmetic of encoder counts, which wrap round at 32 bits."""
 
-from typing import NamedTuple
-
 RANGE = 2**32
-
-
-class Count(NamedTuple):
-    """The encoder's last count."""
-
-    value: int
-    """0 to 2**32 - 1."""
-    age_s: float
 
 
 def further(count: int, by: int) -> int:

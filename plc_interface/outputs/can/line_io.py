@@ -14,7 +14,7 @@ from contextlib import suppress
 from typing import TypeVar
 
 from plc_interface.outputs.can import bring_up
-from plc_interface.outputs.can.counts import RANGE, Count, ahead, further
+from plc_interface.outputs.can.counts import RANGE, ahead, further
 from plc_interface.outputs.can.emergency import described_emergency, is_reset
 from plc_interface.outputs.can.errors import (
     BringUpError,
@@ -127,13 +127,12 @@ class LineIo:
         """Return the counters since the start, by name; docs/plc/can.md lists them."""
         return dict(self._counters)
 
-    def encoder_count(self) -> Count | None:
-        """Return the encoder's last count and its age; None if it is stale or there is none."""
+    def encoder_count(self) -> int | None:
+        """Return the encoder's last count, 0 to 2**32 - 1; None if it is stale or there is none."""
         if self._link is None or self._link.count is None:
             return None
         value, at_s = self._link.count
-        age_s = time.monotonic() - at_s
-        return Count(value, age_s) if age_s <= self._settings.count_stale_s else None
+        return value if time.monotonic() - at_s <= self._settings.count_stale_s else None
 
     def count_at_gate(self, count_at_nest: int) -> int:
         """Return the count at which a fruit reaches the gate, from that when it was at the nest."""
@@ -163,8 +162,8 @@ class LineIo:
             why = messages.NOT_ORDERED(why=why_not or messages.NO_COUNT())
             raise NotReadyError(messages.SHOT(sequence=sequence, what=why))
         with self._rejects.under_way(Order(sequence, lane, at_count)) as pending:
-            if ahead(now.value, at_count) <= 0:
-                raise LateRejectError(sequence, messages.COUNT_PAST(at_count=at_count, now_count=now.value))
+            if ahead(now, at_count) <= 0:
+                raise LateRejectError(sequence, messages.COUNT_PAST(at_count=at_count, now_count=now))
             began_s = time.monotonic()
             self._counters["shots_ordered"] += 1
             link.send(
@@ -197,7 +196,7 @@ class LineIo:
                 async with asyncio.timeout(_POLL_S):
                     return await pending.next()
             now_s, count = time.monotonic(), self.encoder_count()
-            if passed_s is None and count and ahead(count.value, at) <= 0:
+            if passed_s is None and count is not None and ahead(count, at) <= 0:
                 passed_s = now_s
             if passed_s and now_s - passed_s > self._settings.echo_deadline_s:
                 what = messages.NOT_REPORTED(at_count=at)

@@ -62,7 +62,7 @@ class Rig:
         """Order a shot on a belt that stands still, and wait until the gate has it or refused it."""
         self.faults.set(CommonFault.STUCK)
         at_count = (self.nodes.encoder.count + ahead) % 2**32
-        await self.until(lambda: (count := self.io.encoder_count()) and count.value == self.nodes.encoder.count)
+        await self.until(lambda: self.io.encoder_count() == self.nodes.encoder.count)
         shot = asyncio.create_task(self.io.divert(sequence, lane, at_count))
         armed = self.nodes.gate._armed
         await self.until(lambda: shot.done() or sequence % 65536 in armed)

@@ -21,9 +21,7 @@ def test_the_nodes_are_configured_and_operational(on_bus):
         assert gate.read(0x1401, 1) & 0x7FF == 0x180 + 17
         assert gate.read(0x1401, 5) == 1000
         assert encoder.read(0x1800, 5) == 10
-        count = rig.io.encoder_count()
-        assert count is not None
-        assert 0 <= count.age_s <= 1.0
+        assert rig.io.encoder_count() is not None
         assert rig.io.bus_faults == ()
         assert rig.io.why_not_ready is None
         assert rig.io.counters["bring_ups"] == 1

@@ -62,7 +62,7 @@ def test_a_shot_beyond_the_wrap_is_ahead(on_bus):
 def test_a_count_that_is_past_is_refused_and_nothing_is_sent(on_bus):
     async def scenario(rig):
         await rig.ready()
-        count = rig.io.encoder_count().value
+        count = rig.io.encoder_count()
         with pytest.raises(LateRejectError, check=says(messages.COUNT_PAST)) as raised:
             await rig.io.divert(9, 1, count)
         assert raised.value.sequence == 9

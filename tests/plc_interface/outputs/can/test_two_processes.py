@@ -60,7 +60,7 @@ def test_a_fruit_is_diverted_between_processes(configuration, console):
                     await asyncio.sleep(0.01)
                 count = io.encoder_count()
                 assert count is not None
-                echo = await io.divert(9, 3, further(count.value, 3000))
+                echo = await io.divert(9, 3, further(count, 3000))
                 state = await asyncio.to_thread(ask, "127.0.0.1", console, {"do": "line"})
                 assert state["fired"] == [{"sequence": 9, "lane": 3, "pulse_ms": 120, "at_count": echo.fired_count}]
                 assert state["gate"] == "operational"
