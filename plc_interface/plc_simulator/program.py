@@ -68,7 +68,6 @@ class Passage:
     """0 where there is no result."""
     area_mm2: float | None
     closing_mm: float | None
-    confidence_pct: int | None
     cycle_s: float
     """From the trigger to what decided."""
     fruit_length_mm_x10: int
@@ -347,7 +346,6 @@ class LineProgram:
         self._playing_after = fruit.fault
         area = _valid(inputs, "result_area_mm2")
         closing = _valid(inputs, "result_closing_mm_x100")
-        confidence = _valid(inputs, "result_confidence_pct")
         self._passages.append(
             Passage(
                 number=fruit.number,
@@ -357,7 +355,6 @@ class LineProgram:
                 sequence=int(inputs["result_sequence"]) if inputs else 0,
                 area_mm2=area,
                 closing_mm=None if closing is None else closing / 100,
-                confidence_pct=None if confidence is None else int(confidence),
                 cycle_s=now_s - fruit.since_s,
                 fruit_length_mm_x10=int(inputs["result_fruit_length_mm_x10"]) if inputs else 0,
                 fault=fruit.fault,

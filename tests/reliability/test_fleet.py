@@ -11,7 +11,7 @@ from station.settings.configuration import Configuration
 
 
 def passage(number: int, decision: Decision) -> Passage:
-    return Passage(number, number, decision, (), number, 40.0, 3.0, 90, 3.0, 0, None)
+    return Passage(number, number, decision, (), number, 40.0, 3.0, 3.0, 0, None)
 
 
 def cell(*decisions: Decision) -> stations.Cell:

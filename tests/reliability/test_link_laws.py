@@ -28,7 +28,7 @@ RECORD = FullRecord(
 )  # fmt: skip
 PASSAGE = Passage(
     number=1, trigger_id=7, decision=Decision.PASS, reasons=(), sequence=5, area_mm2=38.0, closing_mm=3.0,
-    confidence_pct=90, cycle_s=2.0, fruit_length_mm_x10=0, fault=None,
+    cycle_s=2.0, fruit_length_mm_x10=0, fault=None,
 )  # fmt: skip
 
 
