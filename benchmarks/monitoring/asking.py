@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from .prometheus import alerts_of, recordings
+from .prometheus import recordings, shipped_alerts
 
 DASHBOARDS = Path(__file__).resolve().parents[2] / "deploy" / "grafana" / "dashboards"
 _COMPARED = re.compile(r"(?<![=!<>~])(==|!=|>=|<=|>|<)(?![=~])\s*(?!bool)")
@@ -91,7 +91,7 @@ def unfiltered(expr: str) -> str:
 def rules() -> Iterator[tuple[str, str]]:
     """Every rule's name and expression; an alert's in the form that answers also where nothing is wrong."""
     yield from recordings().items()
-    for name, rule in alerts_of().items():
+    for name, rule in shipped_alerts().items():
         yield name, unfiltered(rule["expr"])
 
 

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from .prometheus import alerts_of
+from .prometheus import shipped_alerts
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "monitoring.md"
 _LABEL = re.compile(r"\{\{\s*(?:humanize\w* )?\$?(?:labels\.)?(\w+)[^}]*\}\}")
@@ -12,7 +12,7 @@ _LABEL = re.compile(r"\{\{\s*(?:humanize\w* )?\$?(?:labels\.)?(\w+)[^}]*\}\}")
 def alerts() -> str:
     """The table of alerts; consequence and action come with the alert itself."""
     lines = ["| alert | severity, after | cause |", "| --- | --- | --- |"]
-    for name, rule in alerts_of().items():
+    for name, rule in shipped_alerts().items():
         notes = rule["annotations"]
         severity = rule["labels"]["severity"]
         severity = "the alarm's own" if "{{" in severity else severity

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import yaml
 
 from .month import Plan, Samples, load, series_name
-from .prometheus import RULES, Prometheus, Series, alerts_of, running, write_configuration
+from .prometheus import RULES, Prometheus, Series, running, shipped_alerts, write_configuration
 
 _UNITS_S = {"s": 1, "m": 60, "h": 3600, "d": 86_400}
 _POINTS = 10_000
@@ -72,7 +72,7 @@ def told(prometheus: Prometheus, plan: Plan) -> list[Told]:
     """
     found = [
         Told(name, series.labels, begin_s, end_s)
-        for name, rule in alerts_of().items()
+        for name, rule in shipped_alerts().items()
         if name != "Watchdog"
         for series in over(prometheus, rule["expr"], plan)
         for begin_s, end_s in episodes(

@@ -10,7 +10,7 @@ import time
 import urllib.error
 import urllib.parse
 import urllib.request
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -173,14 +173,10 @@ def running(folder: Path, configuration: Path, *options: str) -> Iterator[Promet
             process.wait()
 
 
-def alerts_of(files: Iterable[Path] = ()) -> dict[str, dict[str, Any]]:
-    """The shipped alerts by their names.
-
-    Args:
-        files: other rule files instead.
-    """
+def shipped_alerts() -> dict[str, dict[str, Any]]:
+    """The shipped alerts by their names."""
     found = {}
-    for file in files or sorted(RULES.glob("*.yml")):
+    for file in sorted(RULES.glob("*.yml")):
         for group in yaml.safe_load(file.read_text(encoding="utf-8"))["groups"]:
             found |= {rule["alert"]: rule for rule in group["rules"] if "alert" in rule}
     return found

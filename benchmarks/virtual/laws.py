@@ -24,7 +24,7 @@ LAWS = (ONE_OUTCOME, NONE_STALE, NONE_DOUBLED, WHOLE_PRESS, NOTHING_MOVES, ALARM
 HELD = {State.UNKNOWN, State.STOPPED, State.HELD, State.CARRIED, State.LATCHED, State.RECORDING_LATCHED}
 """States in which no motion is under way."""
 _FOR_A_PERSON = {State.CARRIED, State.LATCHED, State.RECORDING_LATCHED}
-_VALID = BY_NAME["status"].bit("result_valid")
+_VALID = BY_NAME["status"].flags(["result_valid"])
 _OUTCOMES = BY_NAME["result_outcome"].codes
 
 

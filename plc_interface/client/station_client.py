@@ -185,9 +185,9 @@ class StationClient(RegisterLink):
         if result.name != "done":
             raise CommandFailedError(f"{command.value} {argument} was not carried out: {result.meaning}", result.name)
 
-    async def change_recipe(self, number: int, deadline_s: float = 40.0) -> None:
+    async def change_recipe(self, number: int) -> None:
         """Make the recipe with this PLC number active. Idempotent. Raises as `command`."""
-        await self.command(CommandName.CHANGE_RECIPE, number, deadline_s)
+        await self.command(CommandName.CHANGE_RECIPE, number)
 
     async def latch_lot(self, lot: str) -> None:
         """Set the lot of the inspections from here on. Idempotent.

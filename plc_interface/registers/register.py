@@ -101,10 +101,6 @@ class Register:
         """All flags with a meaning."""
         return sum(1 << bit.number for bit in self.bits)
 
-    def bit(self, name: str) -> int:
-        """Return the mask of one flag; KeyError for an unknown name."""
-        return self.flags((name,))
-
     def flags(self, names: Iterable[str]) -> int:
         """Return the value in which exactly these flags are set; KeyError for an unknown name."""
         numbers = {bit.name: bit.number for bit in self.bits}

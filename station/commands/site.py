@@ -1,6 +1,5 @@
 """Configuration of the commands that have to work while the station's file is broken."""
 
-import os
 from pathlib import Path
 
 import click
@@ -15,7 +14,7 @@ def site_or_last_good(config: Path | None) -> Configuration:
     Raises:
         SettingsError: it is broken, and there is no last good one.
     """
-    site, broken = read_or_last_good(config, os.environ)
+    site, broken = read_or_last_good(config)
     if broken:
         click.echo(f"{broken}\nthe last good configuration is used", err=True)
     return site

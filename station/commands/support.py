@@ -38,4 +38,4 @@ def _configuration() -> tuple[Configuration, str]:
         return load_configuration(), ""
     except SettingsError as error:
         home = Path(os.environ.get(variable(("home",)), Configuration().home)).absolute()
-        return read_last_good(None, os.environ) or Configuration(home=home), str(error)
+        return read_last_good(None) or Configuration(home=home), str(error)

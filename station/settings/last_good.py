@@ -4,7 +4,6 @@ import contextlib
 import hashlib
 import logging
 import os
-from collections.abc import Mapping
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -19,7 +18,7 @@ _FOLDER = "last_good"
 log = logging.getLogger(__name__)
 
 
-def load_or_last_good(file: Path | None, environ: Mapping[str, str] | None = None) -> tuple[Configuration, str]:
+def load_or_last_good(file: Path | None) -> tuple[Configuration, str]:
     """Read the configuration; if it is broken, return the last good one of the same file.
 
     A good configuration is stored in its home folder. A broken one does not name its home folder: the folder of the
@@ -34,46 +33,45 @@ def load_or_last_good(file: Path | None, environ: Mapping[str, str] | None = Non
     Raises:
         SettingsError: it is broken, and there is no last good one.
     """
-    environ = os.environ if environ is None else environ
-    configuration, broken = read_or_last_good(file, environ)
+    configuration, broken = read_or_last_good(file)
     if broken:
         log.warning("%s; the last good configuration is used", broken)
     else:
-        StateFiles(configuration.home).write(_name(file, environ), configuration.model_dump_json().encode())
+        StateFiles(configuration.home).write(_name(file), configuration.model_dump_json().encode())
     return configuration, broken
 
 
-def read_or_last_good(file: Path | None, environ: Mapping[str, str]) -> tuple[Configuration, str]:
+def read_or_last_good(file: Path | None) -> tuple[Configuration, str]:
     """Read the configuration or the last good one, as `load_or_last_good` does, without storing or logging."""
     try:
-        return load_configuration(file, environ), ""
+        return load_configuration(file), ""
     except SettingsError as error:
-        last_good = read_last_good(file, environ)
+        last_good = read_last_good(file)
         if last_good is None:
             raise
         return last_good, str(error)
 
 
-def read_last_good(file: Path | None, environ: Mapping[str, str]) -> Configuration | None:
+def read_last_good(file: Path | None) -> Configuration | None:
     """Return the last good configuration of a file, as `load_or_last_good` does; None for none."""
-    for home in _homes(file, environ):
+    for home in _homes(file):
         with contextlib.suppress(OSError, ValidationError):
-            return Configuration.model_validate_json((home / _name(file, environ)).read_bytes())
+            return Configuration.model_validate_json((home / _name(file)).read_bytes())
     return None
 
 
-def _name(file: Path | None, environ: Mapping[str, str]) -> str:
+def _name(file: Path | None) -> str:
     """Return the file's name in the home folder, by the source, so that those of two stations are never mixed up."""
-    named = file or environ.get(CONFIG_VARIABLE) or ""
+    named = file or os.environ.get(CONFIG_VARIABLE) or ""
     place = str(Path(named).absolute()) if named else "default"
     return f"{_FOLDER}/{hashlib.sha256(place.encode()).hexdigest()[:16]}.json"
 
 
-def _homes(file: Path | None, environ: Mapping[str, str]) -> list[Path]:
+def _homes(file: Path | None) -> list[Path]:
     """Return the possible home folders, likeliest first."""
     default = Configuration().home
-    homes = [environ[variable(("home",))]] if environ.get(variable(("home",))) else []
-    named = file or environ.get(CONFIG_VARIABLE)
+    homes = [os.environ[variable(("home",))]] if os.environ.get(variable(("home",))) else []
+    named = file or os.environ.get(CONFIG_VARIABLE)
     if named:
         beside = Path(named).absolute().parent
         homes += [beside / default, beside]

@@ -66,10 +66,9 @@ class BackgroundModel:
     Args:
         reference: at the working size, shape (height, width, 3), dtype uint8.
         constants: priors and weights.
-        bands: whether bands along the borders are modelled.
     """
 
-    def __init__(self, reference: Image, constants: Constants, *, bands: bool = True) -> None:
+    def __init__(self, reference: Image, constants: Constants) -> None:
         self._constants = constants
         height, width = reference.shape[:2]
         cell = max(height, width) / _GRID_LONG_SIDE
@@ -86,9 +85,8 @@ class BackgroundModel:
             if i * i + j * j <= _HIGHEST_COSINE**2
         ]
         count = _HIGHEST_COSINE + 1
-        places = [(i, j) for i, j in orders]
-        if bands:  # the functions after the cosines are a band at either end
-            places += [(count, 0), (count + 1, 0), (0, count), (0, count + 1)]
+        # The functions after the cosines are a band at either end.
+        places = [*orders, (count, 0), (count + 1, 0), (0, count), (0, count + 1)]
         self._places = np.array(places).T
         along, upward = (_profiles(side, constants.band_reach) for side in (width, height))
         self._along, self._upward = (_profiles(side, constants.band_reach) for side in self._half)

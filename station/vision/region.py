@@ -79,11 +79,6 @@ class Region(NamedTuple):
     textured: bool
     """Whether achenes or drupelets turn the change's direction within a ninth of the radius."""
 
-    @property
-    def radius_px(self) -> float:
-        """Of a circle of the region's area, at half the working size."""
-        return radius_of(self.mask)
-
 
 def movement(half: FloatImage, background: Background, flat_field: FloatImage, curvature: FloatImage) -> Movement:
     """Prepare a frame's change without background, at half the working size, shape (height, width, 3), grey levels."""

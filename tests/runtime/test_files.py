@@ -13,19 +13,21 @@ from station.settings.problems import SettingsError
 from station.state_files import StateFiles
 
 
-def test_a_broken_configuration_is_replaced_by_its_last_good_form(settings_file, tmp_path):
+def test_a_broken_configuration_is_replaced_by_its_last_good_form(settings_file, tmp_path, monkeypatch):
+    monkeypatch.delenv("STATION_HOME", raising=False)
     file = settings_file()
-    good, broken = load_or_last_good(file, {})
+    good, broken = load_or_last_good(file)
     assert broken == ""
     file.write_text("service: {bench: 12}")
-    again, broken = load_or_last_good(file, {"STATION_HOME": str(good.home)})
+    monkeypatch.setenv("STATION_HOME", str(good.home))
+    again, broken = load_or_last_good(file)
     assert again == good
     assert "service.bench" in broken
     assert str(file) in broken
     other = tmp_path / "other.yaml"
     other.write_text("service: {bench: 12}")
     with pytest.raises(SettingsError):
-        load_or_last_good(other, {"STATION_HOME": str(good.home)})
+        load_or_last_good(other)
 
 
 def test_a_broken_recipe_is_replaced_by_its_last_good_form_and_a_removed_one_is_gone(settings_file, tmp_path):

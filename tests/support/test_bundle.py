@@ -66,8 +66,9 @@ def parts_of(file):
         return {name: archive.read(name).decode() for name in archive.namelist()}
 
 
-def test_a_broken_configuration_gives_its_error_and_the_last_good_one(home, tmp_path):
-    load_or_last_good(None, {"STATION_HOME": str(home)})
+def test_a_broken_configuration_gives_its_error_and_the_last_good_one(home, tmp_path, monkeypatch):
+    monkeypatch.setenv("STATION_HOME", str(home))
+    load_or_last_good(None)
     (home / "station.yaml").write_text("modbus: {unit: seven}\n")
     done = station(home, "support", "--out", tmp_path / "s.zip")
     assert done.returncode == 0, done.stderr

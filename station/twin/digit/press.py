@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from station.twin.contact import FruitOnGel, Mask, Pose
 from station.twin.digit.sensor import Condition, DigitSensor, Image
 from station.twin.fruit import Fruit, Kind, draw_fruit
-from station.twin.gel import MM_PER_PX, Gel
+from station.twin.gel import Gel
 from station.twin.squeeze import Squeeze
 
 
@@ -22,8 +22,6 @@ class PressOptions:
     """Factor on the noise of each frame."""
     drift: float = 1.0
     """Factor on the slow drift of the light."""
-    mm_per_px: float = MM_PER_PX
-    """The unit's scale."""
     references: int = 5
     """No-contact frames before the press."""
     step_s: float = 1.0
@@ -65,8 +63,8 @@ def render_press(
     options = options or PressOptions()
     if not isinstance(fruit, Fruit):
         fruit = draw_fruit(fruit, seed)
-    gel = Gel(mm_per_px=options.mm_per_px)
-    sensor = DigitSensor(seed, options.unit, options.noise, options.drift, options.mm_per_px)
+    gel = Gel()
+    sensor = DigitSensor(seed, options.unit, options.noise, options.drift)
     contact = FruitOnGel(fruit, options.pose, gel)
     references = [sensor.frame(None, index / 30.0, options.condition) for index in range(options.references)]
     sequence = PressSequence(references, [], [], [], list(closings_mm), [], [])

@@ -140,10 +140,6 @@ class UrController:
         """The share of the commanded speed at which the arm really moves."""
         return self.speed_slider / (1.0 + max(0.0, self.faults.amount(CommonFault.SLOW)))
 
-    def tool_position_m(self) -> tuple[float, float, float]:
-        """The tool centre point in the base's frame, m."""
-        return self.body.tool_pose()[:3]
-
     def measured_joints_rad(self) -> tuple[float, ...]:
         """RTDE `actual_q`."""
         error = self.faults.amount(CommonFault.WRONG)

@@ -10,11 +10,11 @@ from benchmarks.monitoring import document
 from benchmarks.monitoring.asking import unfiltered
 from benchmarks.monitoring.document import headings
 from benchmarks.monitoring.history import episodes
-from benchmarks.monitoring.prometheus import RULES, SHIPPED, alerts_of, recordings
+from benchmarks.monitoring.prometheus import RULES, SHIPPED, recordings, shipped_alerts
 from station.inspection.alarm_table import ALARMS
 
 ROOT = SHIPPED.parents[1]
-ALERTS = alerts_of()
+ALERTS = shipped_alerts()
 WANTED = {
     "RejectRateHigh", "NoResultRising", "CycleNearDeadline", "CameraDying", "ReferenceDrifting", "GelWorn",
     "PlcHeartbeatLost", "OutboxGrowing", "DiskFilling", "CalibrationOld", "ProcessRestarts", "StationDown", "HmiLost",

@@ -107,7 +107,7 @@ def test_it_keeps_to_the_speeds_and_goes_straight_to_the_nest(healthy_arm):
                     joint_peak = max(joint_peak, *map(abs, bench.controller.body.speeds_rad_s))
                     x, y, z = bench.controller.body.tool_speed()[:3]
                     tool_peak = max(tool_peak, (x * x + y * y + z * z) ** 0.5)
-                    x, y, _ = bench.controller.tool_position_m()
+                    x, y = bench.controller.body.tool_pose()[:2]
                     off_line_m = max(off_line_m, ((x + 0.75) ** 2 + (y + 0.15) ** 2) ** 0.5)
                     await asyncio.sleep(0.002)
 

@@ -168,5 +168,5 @@ def test_flags_by_name():
     assert control.flags([]) == 0
     assert control.names(0b101) == {"enable", "acknowledge"}
     with pytest.raises(KeyError):
-        control.bit("fire")
+        control.flags(["fire"])
     assert BY_NAME["command_code"].code("call_off") == 3

@@ -256,13 +256,13 @@ class Laws:
         now_s, seen = event.at.s, view(after)["status"]
         assert isinstance(seen, int)
         for name, (bit, fault) in FORGOTTEN.items():
-            began_s = self.since_s.get(name)
+            began_s, shown = self.since_s.get(name), seen & BY_NAME["status"].flags([name])
             if began_s is not None and now_s >= began_s + self.settings.handshake_timeout_s:
                 del self.since_s[name]
                 forgotten = bit in (before.seen or ())
                 assert not forgotten or fault in after.faults or self._cleared(actions), f"{fault.name} is not told"
-                assert not seen & BY_NAME["status"].bit(name) or self._rises(event, before, bit), f"{name} stands on"
-            if not seen & BY_NAME["status"].bit(name):
+                assert not shown or self._rises(event, before, bit), f"{name} stands on"
+            if not shown:
                 self.since_s.pop(name, None)
             elif name not in self.since_s or self._rises(event, before, bit):
                 self.since_s[name] = now_s
@@ -293,7 +293,7 @@ class Laws:
     def _acquiring(event: ev.Event, before: State, after: State) -> None:
         word = view(after)["status"]
         assert isinstance(word, int)
-        now = word & BY_NAME["status"].bit("acquiring")
+        now = word & BY_NAME["status"].flags(["acquiring"])
         reports = event.station.packml_state if isinstance(event, ev.Beat) else None
         lost = before.pending is not None and after.pending is None and after.last_refusal is Refusal.STATION_LOST
         if after.running is not None or reports is PackmlState.EXECUTE or lost:

@@ -219,7 +219,7 @@ class Handshake(RuleBasedStateMachine):
     def bit(self, name: str) -> bool:
         value = self.seen["status"]
         assert isinstance(value, int)
-        return bool(value & STATUS.bit(name))
+        return bool(value & STATUS.flags([name]))
 
     def observe(self) -> None:
         seen = self.seen
@@ -256,7 +256,7 @@ class Handshake(RuleBasedStateMachine):
         if block["result_outcome"] != BY_NAME["result_outcome"].code("NO_RESULT"):
             assert record.judged is not None
             assert block["result_outcome"] == BY_NAME["result_outcome"].code(record.judged.outcome)
-        if flags & BY_NAME["result_flags"].bit("area_valid"):
+        if flags & BY_NAME["result_flags"].flags(["area_valid"]):
             assert record.judged is not None
             assert block["result_area_mm2"] == record.judged.area_mm2
 
