@@ -166,7 +166,7 @@ def _is_answered_or_pending(work: Work, trigger_id: int) -> bool:
 
 
 def _acknowledged(work: Work, event: PlcWrote, rose: frozenset[str], *, changed: bool, left_high: bool) -> None:
-    """Return whether the shown result's sequence was written, or confirmed by the bit; the bit alone is not enough.
+    """Queue the signal of a written sequence or of the acknowledge bit, whose rise alone is not enough.
 
     A PLC that writes the sequence first and sets its bit then waits for result_valid to fall all the same.
     """
