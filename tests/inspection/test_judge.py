@@ -18,7 +18,6 @@ from station.messages import judge as messages
 from station.messages.message import SENTENCES
 from station.settings.recipe import load_recipe
 from station.settings.recipe_model import Recipe
-from station.vision.contact import Flag as MeasurementFlag
 from station.vocabulary import Flag, Reason
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -345,10 +344,6 @@ def test_a_point_that_is_no_number_is_refused():
         replace(point(1.0, 1.0), area_mm2=float("nan"))
     with pytest.raises(ValueError, match="negative"):
         replace(point(1.0, 1.0), area_px=-1)
-
-
-def test_the_judges_flags_are_the_measurements():
-    assert [(flag.name, flag.value) for flag in Flag] == [(flag.name, flag.value) for flag in MeasurementFlag]
 
 
 FLAGS = st.sets(st.sampled_from(list(Flag)), max_size=1)
