@@ -4,7 +4,6 @@ import asyncio
 import functools
 import gc
 import os
-import shutil
 import signal
 import socket
 import subprocess
@@ -24,6 +23,7 @@ from threadpoolctl import threadpool_limits
 
 from station.cli import main
 from tests.ports import free_port, free_ports
+from tests.tools import required
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 KEPT = (("hmi_pages",), ("hmi",), ("plc_interface/registers/generate", "runtime/test_plc_program.py"))
@@ -176,21 +176,10 @@ def nothing_left_behind() -> Iterator[None]:
         threading.Event().wait(0.02)
 
 
-def missing(what: str) -> None:
-    """Skip a test for want of a tool; fail it where CI promises that tools are there."""
-    if os.environ.get("CI") == "true":
-        pytest.fail(f"{what} is missing, and CI=true says that nothing may be", pytrace=False)
-    pytest.skip(f"{what} is missing on this machine")
-
-
-@pytest.fixture
+@pytest.fixture(scope="session")
 def chromium() -> str:
     """The path of the browser."""
-    path = shutil.which("chromium")
-    if path is None:
-        missing("chromium")
-    assert path is not None
-    return path
+    return required("chromium")
 
 
 @pytest.fixture

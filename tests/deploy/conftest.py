@@ -240,16 +240,3 @@ def stand_in(installer: Callable[[str], Any], releases: Path) -> Iterator[StandI
 def environment() -> Path:
     """The environment whose packages are borrowed: installing them anew takes minutes and a package index."""
     return VENV
-
-
-@pytest.fixture
-def tool():
-    """A program of systemd, or no test."""
-
-    def find(name: str) -> str:
-        path = shutil.which(name)
-        if path is None:
-            pytest.skip(f"{name} is missing on this machine")
-        return path
-
-    return find

@@ -10,6 +10,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from hmi.web.navigation import modules
+from tests.tools import optional
 
 
 @pytest.fixture
@@ -45,8 +46,8 @@ def test_the_guide_names_every_file(kiosk, root):
     assert all(f"`{path.name}`" in guide for path in kiosk.iterdir())
 
 
-def test_the_unit_is_one_that_systemd_reads(kiosk, tool, tmp_path):
-    verify = tool("systemd-analyze")
+def test_the_unit_is_one_that_systemd_reads(kiosk, tmp_path):
+    verify = optional("systemd-analyze")
     unit = tmp_path / "fruit-station-kiosk.service"
     text = (kiosk / unit.name).read_text()
     unit.write_text(re.sub(r"^ExecStart=/usr/bin/cage", "ExecStart=/bin/true", text, flags=re.MULTILINE))

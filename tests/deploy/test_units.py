@@ -11,6 +11,7 @@ import pytest
 
 from station.supervision import notify
 from station.supervision.programs import station_programs
+from tests.tools import optional
 
 MOST_EXPOSED = 2.5
 UNITS = ("fruit-station.service", "fruit-station-backup.service", "fruit-station-backup.timer")
@@ -56,18 +57,18 @@ def seconds(text: str) -> float:
     )
 
 
-def test_systemd_finds_nothing_wrong_with_the_units(booted, tool):
+def test_systemd_finds_nothing_wrong_with_the_units(booted):
     units = [booted / "etc/systemd/system" / name for name in UNITS]
     paths = [f"/{path.relative_to(booted)}" for path in units]
-    command = [tool("systemd-analyze"), "verify", f"--root={booted}", "--man=no", "--recursive-errors=no", *paths]
+    command = [optional("systemd-analyze"), "verify", f"--root={booted}", "--man=no", "--recursive-errors=no", *paths]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("name", [name for name in UNITS if name.endswith(".service")])
-def test_what_a_unit_may_is_little(root, tool, name):
+def test_what_a_unit_may_is_little(root, name):
     options = ("security", "--offline=true", "--no-pager", f"--threshold={10 * MOST_EXPOSED:g}")
-    command = [tool("systemd-analyze"), *options, root / "deploy/systemd" / name]
+    command = [optional("systemd-analyze"), *options, root / "deploy/systemd" / name]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     found = re.search(r"Overall exposure level for \S+: ([0-9.]+)", done.stdout)
     assert found, done.stdout + done.stderr
@@ -142,12 +143,12 @@ def test_only_the_support_bundle_of_an_installed_station_reads_the_journal(tmp_p
     assert done.stdout == f"-u fruit-station {groups}-- {program} {command} --help\n"
 
 
-def test_the_calendar_is_one(root, tool):
+def test_the_calendar_is_one(root):
     when = unit(root, UNITS[2])["Timer"]["OnCalendar"][0]
-    subprocess.run([tool("systemd-analyze"), "calendar", when], check=True, capture_output=True)
+    subprocess.run([optional("systemd-analyze"), "calendar", when], check=True, capture_output=True)
 
 
-def test_users_and_folders_are_made(tmp_path, root, tool):
+def test_users_and_folders_are_made(tmp_path, root):
     if os.geteuid() != 0:
         pytest.skip("only root makes users")
     for kind in ("sysusers.d", "tmpfiles.d"):
@@ -158,7 +159,7 @@ def test_users_and_folders_are_made(tmp_path, root, tool):
         for program in ("systemd-sysusers", "systemd-tmpfiles"):
             options = ["--create"] if program == "systemd-tmpfiles" else []
             done = subprocess.run(
-                [tool(program), f"--root={tmp_path}", *options, "fruit-station.conf"],
+                [optional(program), f"--root={tmp_path}", *options, "fruit-station.conf"],
                 capture_output=True,
                 text=True,
                 check=False,

@@ -5,7 +5,6 @@ import contextlib
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 import time
@@ -268,19 +267,14 @@ def connected(playwright: Playwright, address: str) -> Browser:
 
 
 @pytest.fixture(scope="module")
-def browser(cell: Cell, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+def browser(cell: Cell, tmp_path_factory: pytest.TempPathFactory, chromium: str) -> Iterator[Browser]:
     """One headless Chromium for the tests of a file: no other file's tests may meet Playwright's running loop."""
-    path = shutil.which("chromium")
-    if path is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail("chromium is missing, and CI=true says that nothing may be", pytrace=False)
-        pytest.skip("chromium is missing on this machine")
     folder, port = tmp_path_factory.mktemp("browser"), free_ports(1)[0]
     profile, log = f"--user-data-dir={folder / 'profile'}", folder / "chromium.log"
     # A connection made while the first window is still being opened once waited 30 s for it in vain.
-    command = [path, *ARGUMENTS, "--no-startup-window", profile, f"--remote-debugging-port={port}"]
-    with begun(command, log, cell.environment) as chromium:
-        eventually(lambda: said(log, "DevTools listening", chromium))
+    command = [chromium, *ARGUMENTS, "--no-startup-window", profile, f"--remote-debugging-port={port}"]
+    with begun(command, log, cell.environment) as process:
+        eventually(lambda: said(log, "DevTools listening", process))
         with sync_playwright() as playwright:
             browser = connected(playwright, f"http://127.0.0.1:{port}")
             yield browser

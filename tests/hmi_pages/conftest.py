@@ -5,8 +5,6 @@ import contextlib
 import http.client
 import itertools
 import json
-import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -309,15 +307,10 @@ def orchard(site: Site) -> Site:
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    path = shutil.which("chromium")
-    if path is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail("chromium is missing, and CI=true says that nothing may be", pytrace=False)
-        pytest.skip("chromium is missing on this machine")
+def browser(chromium: str) -> Iterator[Browser]:
     expect.set_options(timeout=1000 * PATIENCE_S)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
         yield browser
         browser.close()
 

@@ -2,7 +2,6 @@
 
 import importlib.util
 import os
-import shutil
 import socket
 import subprocess
 import sys
@@ -15,6 +14,7 @@ from typing import Any
 import pytest
 
 from tests.ports import free_port
+from tests.tools import missing, required
 
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT_S = 60.0
@@ -30,19 +30,10 @@ def _helper(name: str) -> ModuleType:
     return module
 
 
-def _missing(what: str) -> None:
-    if os.environ.get("CI") == "true":
-        pytest.fail(f"{what} is missing, and CI=true says that nothing may be", pytrace=False)
-    pytest.skip(f"{what} is missing on this machine")
-
-
 @pytest.fixture(scope="session")
 def postgresql_programs() -> Any:
     """Where PostgreSQL's server programs lie."""
-    programs = _helper("postgres").programs()
-    if programs is None:
-        _missing("postgresql")
-    return programs
+    return _helper("postgres").programs() or missing("postgresql")
 
 
 @pytest.fixture(scope="session")
@@ -61,8 +52,7 @@ def fill() -> Callable[..., None]:
 @pytest.fixture
 def broker(tmp_path: Path) -> Iterator["Broker"]:
     """A running mosquitto that wants a password."""
-    if shutil.which("mosquitto") is None:
-        _missing("mosquitto")
+    required("mosquitto")
     running = Broker(tmp_path)
     running.start()
     yield running

@@ -1,9 +1,7 @@
 """The real server and the real handshake on a port, with a station behind them that a test makes up."""
 
 import asyncio
-import os
 import re
-import shutil
 import time
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
@@ -29,6 +27,7 @@ from station.channel.line import BeginReply, Open, Outcome, PackmlState, Reason,
 from station.settings.modbus import ModbusSettings
 from station.settings.plc import HandshakeSettings
 from tests.ports import free_port
+from tests.tools import required
 
 BEAT_S = 0.05
 
@@ -168,12 +167,7 @@ def serve() -> Callable[..., AbstractAsyncContextManager[Rig]]:
 @pytest.fixture
 def mbpoll() -> str:
     """The path of the Modbus client."""
-    path = shutil.which("mbpoll")
-    if path is None and os.environ.get("CI") == "true":
-        pytest.fail("mbpoll is missing, and CI=true says that nothing may be", pytrace=False)
-    if path is None:
-        pytest.skip("mbpoll is missing on this machine")
-    return path
+    return required("mbpoll")
 
 
 @pytest.fixture

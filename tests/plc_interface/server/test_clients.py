@@ -12,18 +12,12 @@ from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.pdu.mei_message import ReadDeviceInformationResponse
 
 from plc_interface.server.write_lock import WriterChange
+from tests.tools import missing, optional, required
 
 CLIENTS = Path(__file__).parent / "clients"
 FETCHED = Path(tempfile.gettempdir()) / f"fruit-station-clients-{os.getuid()}"
 """Packages from npm, Go's proxy and Maven, kept from one run to the next."""
 FETCH_S, RUN_S = 60, 60
-
-
-def lacks(what: str, *, declared: bool) -> None:
-    """Skip; fail where CI promises that what the project declares is there."""
-    if declared and os.environ.get("CI") == "true":
-        pytest.fail(f"{what} is missing, and CI=true says that nothing may be", pytrace=False)
-    pytest.skip(f"{what} is missing on this machine")
 
 
 def run(*command: object, cwd: Path | None = None, timeout_s: float = RUN_S) -> subprocess.CompletedProcess[str]:
@@ -70,37 +64,34 @@ def test_pymodbus(serve):
     saw(serving, 76)
 
 
-def test_mbpoll(serve):
-    if shutil.which("mbpoll") is None:
-        lacks("mbpoll", declared=True)
+def test_mbpoll(serve, mbpoll):
     serving = serve()
 
-    def mbpoll(*arguments: object) -> subprocess.CompletedProcess[str]:
-        return run("mbpoll", "-m", "tcp", "-p", serving.settings.port, "-a", 1, "-0", "-1", "-q", "-o", 10, *arguments)
+    def poll(*arguments: object) -> subprocess.CompletedProcess[str]:
+        return run(mbpoll, "-m", "tcp", "-p", serving.settings.port, "-a", 1, "-0", "-1", "-q", "-o", 10, *arguments)
 
-    read = mbpoll("-t", "4:int", "-B", "-r", 244, "-c", 1, "127.0.0.1")
+    read = poll("-t", "4:int", "-B", "-r", 244, "-c", 1, "127.0.0.1")
     assert "305419896" in read.stdout
-    assert mbpoll("-t", "4", "-r", 0, "127.0.0.1", 1, 75).returncode != 0
-    assert mbpoll("-t", "4", "-r", 26, "127.0.0.1", 0x5AFE).returncode == 0
-    written = mbpoll("-t", "4", "-r", 0, "127.0.0.1", 1, 75)
+    assert poll("-t", "4", "-r", 0, "127.0.0.1", 1, 75).returncode != 0
+    assert poll("-t", "4", "-r", 26, "127.0.0.1", 0x5AFE).returncode == 0
+    written = poll("-t", "4", "-r", 0, "127.0.0.1", 1, 75)
     assert "Written 2 references" in written.stdout
     assert {"control": 1, "trigger_id": 75} in serving.writes
-    flags = mbpoll("-t", "0", "-r", 0, "-c", 2, "127.0.0.1")
+    flags = poll("-t", "0", "-r", 0, "-c", 2, "127.0.0.1")
     assert [line.split() for line in flags.stdout.splitlines() if line.startswith("[")] == [
         ["[0]:", "1"],
         ["[1]:", "0"],
     ]
-    assert "Illegal data address" in mbpoll("-t", "4", "-r", 60, "-c", 1, "127.0.0.1").stderr
+    assert "Illegal data address" in poll("-t", "4", "-r", 60, "-c", 1, "127.0.0.1").stderr
 
 
 def test_libmodbus(serve, tmp_path):
-    if shutil.which("gcc") is None:
-        lacks("gcc", declared=False)
+    compiler = required("cc")
     if not Path("/usr/include/modbus/modbus.h").exists():
-        lacks("libmodbus-dev", declared=True)
+        missing("libmodbus-dev")
     program = tmp_path / "client"
     source = CLIENTS / "libmodbus_client.c"
-    built = run("gcc", "-Wall", "-Wextra", "-Werror", "-I/usr/include/modbus", "-o", program, source, "-lmodbus")
+    built = run(compiler, "-Wall", "-Wextra", "-Werror", "-I/usr/include/modbus", "-o", program, source, "-lmodbus")
     assert not built.returncode, built.stderr
     serving = serve()
     done = run(program, "127.0.0.1", serving.settings.port)
@@ -109,29 +100,27 @@ def test_libmodbus(serve, tmp_path):
 
 
 def test_modbus_serial_with_parallel_requests(serve):
-    if shutil.which("node") is None or shutil.which("npm") is None:
-        lacks("node with npm", declared=False)
+    node, npm = optional("node"), optional("npm")
     folder = FETCHED / "npm"
     folder.mkdir(parents=True, exist_ok=True)
     if not (folder / "node_modules" / "modbus-serial").exists():
         quiet = ("--silent", "--no-audit", "--no-fund", "--ignore-scripts")
-        fetched("modbus-serial", "npm", "install", *quiet, "--prefix", folder, "modbus-serial@8", cwd=folder)
+        fetched("modbus-serial", npm, "install", *quiet, "--prefix", folder, "modbus-serial@8", cwd=folder)
     shutil.copy(CLIENTS / "parallel.js", folder)
     serving = serve()
-    done = run("node", folder / "parallel.js", "127.0.0.1", serving.settings.port)
+    done = run(node, folder / "parallel.js", "127.0.0.1", serving.settings.port)
     assert not done.returncode, done.stderr
     saw(serving, 79)
 
 
 def test_simonvetter_modbus(serve):
-    if shutil.which("go") is None:
-        lacks("go", declared=False)
+    go = optional("go")
     folder = FETCHED / "go"
     folder.mkdir(parents=True, exist_ok=True)
     shutil.copy(CLIENTS / "client.go", folder)
     (folder / "go.mod").write_text("module client\n\ngo 1.21\n")
-    fetched("simonvetter/modbus", "go", "get", "github.com/simonvetter/modbus@v1.6.3", cwd=folder)
-    fetched("a build of it", "go", "build", "-o", folder / "client", ".", cwd=folder)
+    fetched("simonvetter/modbus", go, "get", "github.com/simonvetter/modbus@v1.6.3", cwd=folder)
+    fetched("a build of it", go, "build", "-o", folder / "client", ".", cwd=folder)
     serving = serve()
     done = run(folder / "client", f"127.0.0.1:{serving.settings.port}")
     assert not done.returncode, done.stderr
@@ -139,14 +128,13 @@ def test_simonvetter_modbus(serve):
 
 
 def test_j2mod(serve):
-    if shutil.which("java") is None or shutil.which("mvn") is None:
-        lacks("java with mvn", declared=False)
+    java, mvn = optional("java"), optional("mvn")
     folder = FETCHED / "java"
     folder.mkdir(parents=True, exist_ok=True)
     if not list(folder.glob("j2mod-*.jar")):
         quiet = ("-q", "-B", f"-DoutputDirectory={folder}")
-        fetched("j2mod", "mvn", *quiet, "-f", CLIENTS / "pom.xml", "dependency:copy-dependencies", cwd=folder)
+        fetched("j2mod", mvn, *quiet, "-f", CLIENTS / "pom.xml", "dependency:copy-dependencies", cwd=folder)
     serving = serve()
-    done = run("java", "-cp", f"{folder}/*", CLIENTS / "Client.java", "127.0.0.1", serving.settings.port)
+    done = run(java, "-cp", f"{folder}/*", CLIENTS / "Client.java", "127.0.0.1", serving.settings.port)
     assert not done.returncode, done.stderr
     saw(serving, 81)

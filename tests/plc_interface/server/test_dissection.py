@@ -1,8 +1,6 @@
 """What the server sends, read by a dissector that others wrote."""
 
-import os
 import random
-import shutil
 import struct
 import subprocess
 from pathlib import Path
@@ -11,6 +9,7 @@ import pytest
 
 from plc_interface.registers.bits import WRITE_KEY
 from plc_interface.registers.map import BY_NAME
+from tests.tools import required
 
 CLIENT, SERVER = (40_000, "127.0.0.1"), (502, "127.0.0.1")
 GOOD = (
@@ -39,10 +38,7 @@ BAD = (
 
 @pytest.fixture
 def tshark() -> str:
-    path = shutil.which("tshark")
-    if path is None and os.environ.get("CI") == "true":
-        pytest.fail("tshark is missing, and CI=true says that nothing may be", pytrace=False)
-    return path or pytest.skip("tshark is missing on this machine")
+    return required("tshark")
 
 
 def talk(wire, requests) -> list[tuple[bytes, bytes]]:

@@ -5,9 +5,7 @@ malformed in what the server sends.
 """
 
 import contextlib
-import os
 import random
-import shutil
 import socket
 import struct
 import subprocess
@@ -26,6 +24,7 @@ from benchmarks.attack.malformed_frames import (
     length_beyond_what_comes,
     truncated,
 )
+from tests.tools import required
 
 FRAMES = 3000
 SEED = 20_260_701
@@ -134,9 +133,7 @@ def test_each_gets_its_exception_or_the_end(serving, good_client, connect, caplo
 
 
 def test_tshark_finds_nothing_malformed_in_the_answers(serving, connect, tmp_path):
-    if shutil.which("tshark") is None:
-        assert os.environ.get("CI") != "true", "tshark is missing, and CI=true says that nothing may be"
-        pytest.skip("tshark is missing on this machine")
+    required("tshark")
     capture = play(20 * len(KINDS), serving, connect)
     wire = connect(serving)
     good = [

@@ -4,9 +4,7 @@ import asyncio
 import datetime as dt
 import gc
 import ipaddress
-import os
 import re
-import shutil
 import socket
 import ssl
 import subprocess
@@ -24,6 +22,7 @@ from plc_interface.server.tls import ROLE_EXTENSION
 from station.errors import StationError
 from station.settings.modbus import ModbusTlsSettings
 from tests.ports import free_port
+from tests.tools import required
 
 REFERENCE = BY_NAME["reference_u16"].address
 DOCUMENT = Path(__file__).resolve().parents[3] / "docs" / "plc" / "server.md"
@@ -381,10 +380,7 @@ class TestBadFiles:
 
 
 def test_the_commands_in_the_document_make_a_writer(connect, serve, tls_port, tmp_path):
-    openssl = shutil.which("openssl")
-    if openssl is None:
-        assert os.environ.get("CI") != "true", "openssl is missing, and CI=true says that nothing may be"
-        pytest.skip("openssl is missing on this machine")
+    required("openssl")  # comes with postgresql
     (commands,) = re.findall(r"```\n(new=.*?)```", DOCUMENT.read_text("utf-8"), re.DOTALL)
     done = subprocess.run(["bash", "-ec", commands], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
