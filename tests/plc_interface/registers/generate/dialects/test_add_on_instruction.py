@@ -145,10 +145,10 @@ def test_ids_over_half_their_range(plc):
 
 def test_a_dead_heartbeat_and_a_late_result_divert(plc):
     plc.accepted()
-    plc.scan(2_005)
+    plc.wait(20.05)
     assert (plc.block["timed_out"], plc.block["passed"]) == (True, False)
     plc.station.beating = False
-    plc.scan(210)
+    plc.wait(2.1)
     assert not any(plc.block[name] for name in ("alive", "ready", "busy", "done", "passed", "timed_out"))
     assert plc.control() == frozenset()
     words = plc.block["registers"]

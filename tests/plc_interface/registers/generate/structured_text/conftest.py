@@ -397,7 +397,7 @@ class Station:
 class Plc:
     """The block in a scan loop with a station."""
 
-    SCAN_S = 0.01
+    SCAN_S, WAITING_SCAN_S = 0.01, 0.1
 
     def __init__(self, order: WordOrder = WordOrder.HIGH_FIRST) -> None:
         self.library = Library(data_types(), function_block(), example())
@@ -416,9 +416,14 @@ class Plc:
     def scan(self, scans: int = 1, **inputs: Any) -> None:
         self.inputs.update(inputs)
         for _ in range(scans):
-            self.library.now_s += self.SCAN_S
-            self.station.beat()
-            self.block(station=self.station.words, **self.inputs)
+            self._scan(self.SCAN_S)
+
+    def wait(self, duration_s: float) -> None:
+        """Pass time in which nothing but timers changes: one scan, which starts them, then one in each 0.1 s."""
+        until_s = self.library.now_s + duration_s
+        self.scan()
+        while self.library.now_s < until_s:
+            self._scan(min(self.WAITING_SCAN_S, until_s - self.library.now_s))
 
     def written(self, name: str) -> Any:
         """A register of the control block as the block wants it written."""
@@ -444,6 +449,11 @@ class Plc:
         assert (self.written("fruit_length_mm_x10"), self.written("size_class")) == (0, 0)
         self.station.flags("online", "inspecting")
         self.scan()
+
+    def _scan(self, duration_s: float) -> None:
+        self.library.now_s += duration_s
+        self.station.beat()
+        self.block(station=self.station.words, **self.inputs)
 
 
 @pytest.fixture

@@ -148,7 +148,7 @@ def test_every_output_is_zero_once_the_stations_heartbeat_stops(plc, phase):
             assert plc.block["recipe_busy"]
     assert plc.block["alive"]
     plc.station.beating = False
-    plc.scan(210)
+    plc.wait(2.1)
     assert [name for name in OUTPUTS if not zero(plc.block[name])] == []
     assert plc.control() == frozenset()
     left = {at for at, word in enumerate(plc.block["registers"]) if word}
@@ -159,7 +159,7 @@ def test_every_output_is_zero_once_the_stations_heartbeat_stops(plc, phase):
 def test_a_pass_that_comes_with_a_dead_heartbeat_is_not_used(plc):
     plc.accepted()
     plc.station.beating = False
-    plc.scan(205)
+    plc.wait(2.05)
     plc.station.show(5, 7)
     plc.scan(50)
     assert not plc.block["passed"]
@@ -174,7 +174,7 @@ def test_a_pass_that_comes_with_a_dead_heartbeat_is_not_used(plc):
 def test_after_a_lost_heartbeat_a_held_inspect_triggers_nothing(plc):
     plc.accepted()
     plc.station.beating = False
-    plc.scan(205)
+    plc.wait(2.05)
     plc.station.beating = True
     plc.station.flags("online", "trigger_ready")
     plc.scan(20, fruit_id=8)
@@ -190,7 +190,7 @@ def test_a_lost_link_is_a_lost_heartbeat_and_one_lost_exchange_is_not(plc):
     plc.accepted()
     plc.scan(connected=False)
     assert plc.block["busy"]
-    plc.scan(250, connected=False)
+    plc.wait(2.5)
     assert not plc.block["alive"]
     assert not plc.block["busy"]
 
@@ -297,14 +297,14 @@ def test_the_block_itself_refuses_what_the_station_would(plc, case):
 def test_no_answer_ends_in_a_time_out(plc):
     plc.scan(3)
     plc.scan(inspect=True)
-    plc.scan(205)
+    plc.wait(2.05)
     assert (plc.block["done"], plc.block["timed_out"], plc.block["passed"]) == (True, True, False)
     assert "trigger" not in plc.control()
 
 
 def test_no_result_in_time_diverts_and_the_late_one_is_discarded(plc):
     plc.accepted()
-    plc.scan(2_005)
+    plc.wait(20.05)
     assert (plc.block["done"], plc.block["timed_out"], plc.block["passed"]) == (True, True, False)
     plc.station.show(5, 7)
     plc.scan(3)
@@ -343,7 +343,7 @@ def test_a_change_of_recipe(plc, bit):
 def test_a_change_of_recipe_that_never_ends_has_failed(plc):
     plc.scan(3)
     plc.scan(change_recipe=True, recipe_number=12)
-    plc.scan(3_005)
+    plc.wait(30.05)
     assert (plc.block["recipe_busy"], plc.block["recipe_done"], plc.block["recipe_failed"]) == (False, False, True)
 
 
@@ -391,11 +391,11 @@ def play(plc, what, number, sequence):
             station.flags("online", "trigger_acknowledged", "missed")
         case "freeze" | "beat":
             station.beating = what == "beat"
-            plc.scan(210)
+            plc.wait(2.1)
         case "inspect" | "release":
             plc.scan(inspect=what == "inspect", fruit_id=number)
         case _:
-            plc.scan(50 * number)
+            plc.wait(0.5 * number)
 
 
 @given(STEPS)
