@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import logging
 import os
 import pty
 import resource
@@ -194,14 +195,16 @@ def spoil_folder(folder: Path) -> Path:
         (spoil_folder, "the folder has no images"),
     ],
 )
-def test_one_bad_image_costs_exit_code_2_and_no_other_result(press, analyze_apart, tmp_path, spoil, words):
+def test_one_bad_image_costs_exit_code_2_and_no_other_result(press, analyze, tmp_path, caplog, spoil, words):
     bad = spoil(press.folder)
     first, last = press.folder / "frame_9.png", press.folder / "frame_12.png"
     out = tmp_path / "out"
-    done = analyze_apart("--reference", press.reference, "--method", "paper", "--out", out, first, bad, last)
+    done = analyze("--reference", press.reference, "--method", "paper", "--out", out, first, bad, last)
     assert done.returncode == 2
     assert words in done.stderr
     assert [line for line in done.stderr.splitlines() if not line.startswith("station: ")] == []
+    # Printed by a process without pytest.
+    assert [record for record in caplog.records if record.levelno >= logging.WARNING] == []
     assert "bad" in done.stderr
     assert [row["image"] for row in read_table(out / "results.csv")] == ["frame_9.png", "frame_12.png"]
     (error,) = read_table(out / "errors.csv")
