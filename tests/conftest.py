@@ -23,7 +23,7 @@ from threadpoolctl import threadpool_limits
 
 from station.cli import main
 from tests.ports import free_port, free_ports
-from tests.tools import required
+from tests.tools import missing, required
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 KEPT = (("hmi_pages",), ("hmi",), ("plc_interface/registers/generate", "runtime/test_plc_program.py"))
@@ -180,6 +180,14 @@ def nothing_left_behind() -> Iterator[None]:
 def chromium() -> str:
     """The path of the browser."""
     return required("chromium")
+
+
+@pytest.fixture(scope="session")
+def postgresql_programs() -> Path:
+    """The folder of PostgreSQL's server programs."""
+    from benchmarks.archive import postgres  # noqa: PLC0415 (psycopg takes long to load, and few tests need it)
+
+    return postgres.programs() or missing("postgresql")
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """A PostgreSQL and an MQTT broker of the test's own, and records with many inspections."""
 
-import importlib.util
 import os
 import socket
 import subprocess
@@ -8,45 +7,27 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import pytest
 
+from benchmarks.archive import many, postgres
 from tests.ports import free_port
-from tests.tools import missing, required
+from tests.tools import required
 
-ROOT = Path(__file__).resolve().parents[2]
 LIMIT_S = 60.0
 
 
-def _helper(name: str) -> ModuleType:
-    """A module that benchmarks share with these tests."""
-    specification = importlib.util.spec_from_file_location(name, ROOT / "benchmarks" / "archive" / f"{name}.py")
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture(scope="session")
-def postgresql_programs() -> Any:
-    """Where PostgreSQL's server programs lie."""
-    return _helper("postgres").programs() or missing("postgresql")
-
-
-@pytest.fixture(scope="session")
-def server(postgresql_programs: Any) -> Iterator[Any]:
+def server(postgresql_programs: Path) -> Iterator[postgres.Server]:
     """A running PostgreSQL with our tables."""
-    with _helper("postgres").throwaway(postgresql_programs) as started:
+    with postgres.throwaway(postgresql_programs) as started:
         yield started
 
 
 @pytest.fixture
 def fill() -> Callable[..., None]:
     """Write many inspections into a records' folder."""
-    return _helper("many").fill
+    return many.fill
 
 
 @pytest.fixture

@@ -1,13 +1,11 @@
-"""A real Prometheus and PostgreSQL, or a word on what is missing."""
+"""A real Prometheus, or a word on what is missing."""
 
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from benchmarks.archive import postgres
 from benchmarks.monitoring import prometheus
-from tests.tools import missing, required
+from tests.tools import required
 
 
 @pytest.fixture
@@ -16,9 +14,3 @@ def promtool() -> Any:
     required("promtool")
     required("prometheus")
     return prometheus.promtool
-
-
-@pytest.fixture
-def postgresql_programs() -> Path:
-    """Where PostgreSQL's server programs lie."""
-    return postgres.programs() or missing("postgresql")
