@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -48,12 +47,12 @@ from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
 from station.twin.console import ask as ask_twin
 from tests.chromium import ARGUMENTS
+from tests.eventually import PATIENCE_S, eventually
 from tests.hosts import fresh_host
 from tests.ports import free_ports
 from tests.quick_recipes import NUMBERS, quick_recipes
 from tests.slower_mode import SLOWER_MODE
 
-PATIENCE_S = 60.0
 ADMIN, ADMIN_PIN = "admin", "482915"
 OPERATOR, OPERATOR_PIN = "Ana", "7391"
 KEEPER = """
@@ -72,16 +71,6 @@ while process.poll() is None:
 """
 """Keeps a program for these tests and ends it with them, apart from their own processes: what it starts anew while a
 test goes on is none of that test's."""
-
-
-def eventually(what: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
-    """Poll until something is so."""
-    deadline_s = time.monotonic() + patience_s
-    while True:
-        if value := what():
-            return value
-        assert time.monotonic() < deadline_s, f"did not come about within {patience_s} s"
-        time.sleep(0.05)
 
 
 def run_apart(work: Coroutine[Any, Any, Any]) -> Any:
@@ -125,7 +114,7 @@ class Cell:
             state = self.state()
             return state if state is not None and what(state) else None
 
-        return eventually(look)
+        return eventually(look, of=what)
 
     def choose(self, kind: str) -> None:
         """A ready station with a recipe and its fruit; on a bench a person says first that the jaws are clear."""

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import functools
 import http.client
 import itertools
 import json
@@ -47,6 +48,7 @@ from station.settings.recipe_text import with_values
 from station.twin.console import ask
 from station.vocabulary import Reason
 from tests.chromium import ARGUMENTS
+from tests.eventually import eventually as poll
 from tests.hosts import fresh_host
 from tests.ports import free_port
 from tests.slower_mode import SLOWER_MODE
@@ -62,15 +64,7 @@ MEASURED = frozenset(list(Reason)[: list(Reason).index(Reason.REFERENCE_BAD)]) -
 _KEPT: list[int] = []
 """Processes of the site, which all modules share."""
 T = TypeVar("T")
-
-
-def eventually(what: Callable[[], T], patience_s: float = PATIENCE_S) -> T:
-    """Poll until something is so."""
-    deadline_s = time.monotonic() + patience_s
-    while not (value := what()):
-        assert time.monotonic() < deadline_s, f"did not come about within {patience_s} s"
-        time.sleep(0.05)
-    return value
+eventually = functools.partial(poll, patience_s=PATIENCE_S)
 
 
 @pytest.fixture(scope="session", name="eventually")

@@ -16,6 +16,7 @@ from station.outbox.status import DestinationStatus, outbox_folder, write_status
 from station.records.audit import AuditEntry
 from station.runtime.station import Station
 from station.settings.configuration import load_configuration
+from tests.eventually import until
 from tests.ports import free_port
 
 AWAY = messages.NOT_YET_CONNECTED()
@@ -53,11 +54,6 @@ def test_a_postgresql_that_is_away_is_an_alarm_until_it_was_told_all(server, sit
     configuration = site(server.folder, alarm_after_rows=30)
     station = Station(configuration)
 
-    async def until(holds):
-        async with asyncio.timeout(LIMIT_S):
-            while not holds():
-                await asyncio.sleep(0.05)
-
     def told():
         assert station.service is not None
         return station.service.alarms.alarms.get(AlarmId.OUTBOX_BEHIND)
@@ -69,17 +65,17 @@ def test_a_postgresql_that_is_away_is_an_alarm_until_it_was_told_all(server, sit
         telling = asyncio.create_task(run_outbox(configuration.outbox, configuration.home))
         try:
             status = outbox_folder(configuration.home) / "status.json"
-            await until(lambda: status.exists() and '"connected":true' in status.read_text())
+            await until(lambda: status.exists() and '"connected":true' in status.read_text(), LIMIT_S)
             assert told().state == "normal"
             await asyncio.to_thread(server.stop, "fast")
             entries = [AuditEntry("ada", "quality", "tried", f"thing {number}") for number in range(40)]
             assert station.service is not None
             await station.service.registry.records.audit(*entries)
-            await until(lambda: told().state == "unacknowledged")
+            await until(lambda: told().state == "unacknowledged", LIMIT_S)
             assert "postgresql: 4" in str(told().detail)
             assert "entries wait, for " in str(told().detail)
             await asyncio.to_thread(server.start)
-            await until(lambda: told().state == "returned")
+            await until(lambda: told().state == "returned", LIMIT_S)
         finally:
             if not (server.folder / "data" / "postmaster.pid").exists():  # other tests use it too
                 await asyncio.to_thread(server.start)

@@ -12,6 +12,7 @@ from station.outbox.errors import OutboxError
 from station.outbox.mqtt import Mqtt
 from station.outbox.publisher import Publisher
 from station.settings.outbox import OutboxMqttSettings
+from tests.eventually import until
 
 LIMIT_S = 90.0
 
@@ -29,12 +30,6 @@ def listener(broker):
         "127.0.0.1", broker.port, username=broker.user, password=broker.password, identifier="listener",
         clean_session=False,
     )  # fmt: skip
-
-
-async def until(condition):
-    async with asyncio.timeout(LIMIT_S):
-        while not condition():
-            await asyncio.sleep(0.02)
 
 
 async def hear(broker, wanted, heard):
@@ -60,14 +55,14 @@ def test_events_are_published_in_order_and_none_is_missing_after_the_broker_was_
         teller = Publisher(records, "line-7", mqtt, longest_pause_s=0.5)
         telling = asyncio.create_task(teller.run())
         try:
-            await until(lambda: teller.status().waiting == 0)  # what was there before is no news
+            await until(lambda: teller.status().waiting == 0, LIMIT_S)  # what was there before is no news
             heard = []
             listening = asyncio.create_task(hear(broker, set(range(4, 61)), heard))
-            await until(lambda: ("fruit/line-7/online", True) in heard)
+            await until(lambda: ("fruit/line-7/online", True) in heard, LIMIT_S)
             await asyncio.to_thread(fill, records, 4, 20, 1)
-            await until(lambda: len(heard) > 10 and teller.status().waiting == 0)
+            await until(lambda: len(heard) > 10 and teller.status().waiting == 0, LIMIT_S)
             broker.stop()
-            await until(lambda: not teller.status().connected)
+            await until(lambda: not teller.status().connected, LIMIT_S)
             await asyncio.to_thread(fill, records, 21, 60, 1)
             broker.start()
             await listening

@@ -1,8 +1,7 @@
 """A scripted station behind its channel, and waiting for what it does."""
 
 import asyncio
-import time
-from collections.abc import Callable
+import functools
 from typing import Any
 
 from station.channel.line import (
@@ -25,17 +24,12 @@ from station.channel.line import (
 )
 from station.channel.server import ChannelServer, Handlers
 from station.errors import BadInputError
+from tests import eventually
 
 PATIENCE_S = 30.0
 
 
-async def until(condition: Callable[[], Any], what: str = "") -> Any:
-    """Poll, with a deadline, until a condition gives something true."""
-    deadline_s = time.monotonic() + PATIENCE_S
-    while not (met := condition()):
-        assert time.monotonic() < deadline_s, f"never came: {what or condition}"
-        await asyncio.sleep(0.01)
-    return met
+until = functools.partial(eventually.until, patience_s=PATIENCE_S)
 
 
 class ScriptedStation:

@@ -18,7 +18,7 @@ from station.channel.panel_maintenance_queries import (
     GetCalibration,
     StartCalibrationRun,
 )
-from tests.runtime.conftest import eventually
+from tests.eventually import until
 
 MAX = Actor(who="Max", role="maintenance")
 PLACES = ((-2.5, 0.0),)
@@ -36,7 +36,7 @@ async def give(panel: ChannelClient, name: OperatorCommandName) -> OperatorComma
         orders = (await panel.request(GetPanelState(), PanelState, deadline_s=20)).orders
         return next((each for each in orders if each.ticket == given.ticket and each.state != "executing"), None)
 
-    return await eventually(ended)
+    return await until(ended)
 
 
 async def stop(panel: ChannelClient) -> None:

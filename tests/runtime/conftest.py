@@ -46,25 +46,12 @@ from station.settings.recipe import load_recipes
 from station.twin.digit import server
 from station.twin.process import Twin, TwinOptions
 from station.twin.robotiq import model
+from tests.eventually import PATIENCE_S, until
 from tests.hosts import fresh_host
 from tests.ports import free_port
 from tests.quick_recipes import NUMBERS, quick_recipes
 
-PATIENCE_S = 60.0
 LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=())
-
-
-async def eventually(what: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
-    """Poll until something is so."""
-    deadline_s = time.monotonic() + patience_s
-    while True:
-        value = what()
-        if asyncio.iscoroutine(value):
-            value = await value
-        if value:
-            return value
-        assert time.monotonic() < deadline_s, f"did not come about within {patience_s} s"
-        await asyncio.sleep(0.02)
 
 
 @dataclass
@@ -148,7 +135,7 @@ class Bench:
     async def until(self, is_so: Callable[[], Any], patience_s: float = PATIENCE_S) -> None:
         """Wait until something is so; a failure says what the station was at meanwhile."""
         try:
-            await eventually(is_so, patience_s)
+            await until(is_so, patience_s)
         except AssertionError as error:
             service = self.station.service
             assert service is not None
@@ -166,7 +153,7 @@ class Bench:
     async def choose(self, kind: str) -> None:
         """A ready station with a recipe; on a bench a person first says that the jaws are clear."""
         self.twin.world.remove()
-        await eventually(lambda: self.phase in {State.UNKNOWN, State.HELD, State.IDLE})
+        await until(lambda: self.phase in {State.UNKNOWN, State.HELD, State.IDLE})
         done = await self.line.order(CommandName.RESET)
         assert done.done, done.why
         done = await self.line.order(CommandName.CHANGE_RECIPE, NUMBERS[kind])

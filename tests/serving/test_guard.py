@@ -13,6 +13,7 @@ from starlette.routing import Route
 
 from station.serving.guard import Limits, is_this_machines
 from station.serving.server import Server, listen
+from tests.eventually import until
 
 ASK = b"GET / HTTP/1.1\r\nhost: here\r\n\r\n"
 LARGE = b"GET /large HTTP/1.1\r\nhost: here\r\n\r\n"
@@ -20,6 +21,7 @@ ENDLESS = b"GET /endless HTTP/1.1\r\nhost: here\r\n\r\n"
 LONG = b"GET /long HTTP/1.1\r\nhost: here\r\n\r\n"
 LIMITS = Limits(most=8, per_address=4, reserve=4)
 AS_PAGES = Limits(most=200, per_address=48, reserve=200)
+LIMIT_S = 20.0
 STRANGER, ANOTHER, KNOWN = "127.0.0.9", "127.0.0.8", "127.0.0.1"
 
 
@@ -55,14 +57,14 @@ class Door:
 
 async def answered(reader):
     with contextlib.suppress(OSError):
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(LIMIT_S):
             return (await reader.readline()).startswith(b"HTTP/1.1 200")
     return False
 
 
 async def ended(reader):
     with contextlib.suppress(ConnectionError):
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(LIMIT_S):
             return await reader.read() == b""
     return True
 
@@ -70,12 +72,6 @@ async def ended(reader):
 def files():
     """How many files this process has open, the connections of clients and server among them."""
     return len(list(Path("/proc/self/fd").iterdir()))
-
-
-async def until(what):
-    async with asyncio.timeout(20):
-        while not what():
-            await asyncio.sleep(0.02)
 
 
 @pytest.fixture
@@ -108,7 +104,7 @@ def door():
             listener = listen("127.0.0.1", 0, "hmi", "the pages", limits, lambda address: address == KNOWN)
             server = Server(listener, Starlette(routes=routes), lifespan="off")
             serving = asyncio.create_task(server.run_until_exit())
-            await until(lambda: server.started)
+            await until(lambda: server.started, LIMIT_S)
             async with contextlib.AsyncExitStack() as stack:
                 await steps(Door(listener, under_way, stack))
                 hold.set()
@@ -148,7 +144,7 @@ def test_a_request_among_a_crowd_of_its_own_address_is_answered(door, sent):
             (person,) = come(1, ASK)
             come(90, sent)
             person.setblocking(False)
-            async with asyncio.timeout(20):
+            async with asyncio.timeout(LIMIT_S):
                 assert (await asyncio.get_running_loop().sock_recv(person, 15)).startswith(b"HTTP/1.1 200")
 
     door(steps, AS_PAGES)
@@ -189,10 +185,10 @@ def test_after_an_answer_the_next_request_has_its_time_again(door):
         assert await answered(reader)
         await asyncio.sleep(1.3)  # more than the first request's time
         writer.write(ASK)
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(LIMIT_S):
             assert b"HTTP/1.1 200" in await reader.readuntil(b"here") + await reader.readuntil(b"here")
         writer.write(ASK[:10])
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(LIMIT_S):
             await reader.read()
 
     door(steps)
@@ -204,8 +200,8 @@ def test_a_client_that_does_not_take_its_response_ends(door, request_):
         before = files()
         with socket.create_connection(("127.0.0.1", door.port)) as deaf:
             deaf.sendall(request_)
-            await until(lambda: files() == before + 2)
-            await until(lambda: files() == before + 1)
+            await until(lambda: files() == before + 2, LIMIT_S)
+            await until(lambda: files() == before + 1, LIMIT_S)
         assert await door.ask()
 
     door(steps)
@@ -216,7 +212,7 @@ def test_requests_under_way_do_not_give_way_and_leave_the_reserve_alone(door):
         for source in (STRANGER, ANOTHER):
             for _ in range(4):
                 (await door.come(source))[1].write(LONG)
-        await until(lambda: len(door.under_way) == 8)
+        await until(lambda: len(door.under_way) == 8, LIMIT_S)
         assert not await door.ask("127.0.0.7")
         assert await door.ask(KNOWN)
 
@@ -229,7 +225,7 @@ def test_a_place_is_held_until_the_request_of_who_left_is_done(door):
             _, writer = await door.come()
             writer.write(LONG)
             before = len(door.under_way)
-            await until(lambda before=before: len(door.under_way) > before)
+            await until(lambda before=before: len(door.under_way) > before, LIMIT_S)
             await door.leave(writer)
         assert not await door.ask()
         assert await door.ask(ANOTHER)

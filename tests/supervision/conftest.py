@@ -1,14 +1,17 @@
 """Small programs to supervise, each told by a word what to do wrong."""
 
 import asyncio
+import functools
 import logging
 import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from station.supervision.supervisor import Program, Supervisor
+from tests import eventually
 
 CHILD = """
 import asyncio, os, signal, sys, time
@@ -87,12 +90,6 @@ def bench(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> Bench:
     return Bench(tmp_path, caplog)
 
 
-async def until(condition: Callable[[], object], limit_s: float = 30.0) -> None:
-    async with asyncio.timeout(limit_s):
-        while not condition():
-            await asyncio.sleep(0.02)
-
-
-@pytest.fixture(name="until")
-def until_fixture() -> Callable[..., object]:
-    return until
+@pytest.fixture
+def until() -> Callable[..., Awaitable[Any]]:
+    return functools.partial(eventually.until, patience_s=30.0)

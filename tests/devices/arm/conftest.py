@@ -12,6 +12,7 @@ from station.settings.arm import ArmSettings
 from station.twin.clock import SteadyClock
 from station.twin.faults import FaultBoard
 from station.twin.ur.controller import UrController, arm_faults
+from tests import eventually
 from tests.hosts import fresh_host
 
 
@@ -111,18 +112,6 @@ def healthy() -> Callable[[UrArm], contextlib.AbstractAsyncContextManager[None]]
 
 
 @pytest.fixture
-def until() -> Callable[[Callable[[], Awaitable[bool] | bool]], Awaitable[None]]:
-    """Wait for a condition, with a deadline."""
-
-    async def wait(condition: Callable[[], Awaitable[bool] | bool], deadline_s: float = 15.0) -> None:
-        async with asyncio.timeout(deadline_s):
-            while True:
-                met = condition()
-                if isinstance(met, bool):
-                    if met:
-                        return
-                elif await met:
-                    return
-                await asyncio.sleep(0.02)
-
-    return wait
+def until() -> Callable[..., Awaitable[Any]]:
+    """Poll with little patience."""
+    return lambda condition, patience_s=15.0: eventually.until(condition, patience_s)

@@ -18,7 +18,8 @@ from pymodbus.client import AsyncModbusTcpClient
 
 from plc_interface.registers.codec import WordOrder, decode, encode
 from plc_interface.registers.map import BY_NAME, GROUP_BY_NAME
-from tests.plc_interface.scripted_station import PATIENCE_S, ScriptedStation, until
+from tests.plc_interface import scripted_station
+from tests.plc_interface.scripted_station import PATIENCE_S, ScriptedStation
 
 COMMAND = (sys.executable, "-m", "station", "plc", "run")
 PATIENT = {"handshake_begin_deadline_s": 10.0, "handshake_station_lost_after_s": 30.0}
@@ -219,6 +220,6 @@ def limit_s() -> float:
 
 
 @pytest.fixture
-def eventually() -> Callable[..., Any]:
-    """See `until`."""
-    return until
+def until() -> Callable[..., Any]:
+    """Poll with the scripted station's patience."""
+    return scripted_station.until

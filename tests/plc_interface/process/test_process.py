@@ -13,7 +13,7 @@ from station.messages.message import verbatim
 
 
 @pytest.mark.parametrize("order", ["high_first", "low_first"])
-def test_a_fruit_from_enable_to_acknowledge(cell, eventually, order):
+def test_a_fruit_from_enable_to_acknowledge(cell, until, order):
     async def scenario():
         async with cell(modbus_word_order=order) as made:
             station, plc = made.station, await made.plc()
@@ -42,7 +42,7 @@ def test_a_fruit_from_enable_to_acknowledge(cell, eventually, order):
             await plc.set("acknowledge", acknowledged_sequence=101)
             await plc.wait(without="result_valid", acknowledged_sequence_echo=101, result_sequence=0)
             await plc.drop("acknowledge")
-            await eventually(lambda: station.acknowledged == 101)
+            await until(lambda: station.acknowledged == 101)
             await plc.trigger(4712)
             station.finish("PASS")
             second = await plc.wait("result_valid")
@@ -58,7 +58,7 @@ def test_a_fruit_from_enable_to_acknowledge(cell, eventually, order):
                 "fail": 1,
                 "missed": 0,
             }
-            await eventually(lambda: station.published == station.outcomes)
+            await until(lambda: station.published == station.outcomes)
             assert station.lines[-1].counters["count_pass"] == 1
 
     asyncio.run(scenario())
@@ -135,7 +135,7 @@ def test_every_refusal_is_told_with_its_reason_and_counted(cell, limit_s):
     asyncio.run(scenario())
 
 
-def test_a_lot_with_a_barcode_readers_cr_fails_its_latch_and_nothing_else(cell, eventually):
+def test_a_lot_with_a_barcode_readers_cr_fails_its_latch_and_nothing_else(cell, until):
     async def scenario():
         async with cell() as made:
             station, plc = made.station, await made.plc()
@@ -143,11 +143,11 @@ def test_a_lot_with_a_barcode_readers_cr_fails_its_latch_and_nothing_else(cell, 
             for heartbeat in (1, 2):
                 await plc.beat(heartbeat, b"LOT 7\r")
                 await plc.wait("trigger_ready", plc_heartbeat_echo=heartbeat)
-            await eventually(lambda: station.lines[-1].plc_alive)
+            await until(lambda: station.lines[-1].plc_alive)
             assert station.lines[-1].faults == ()
             await plc.set("latch_lot")
             await plc.wait("trigger_ready", without="lot_latched", latched_lot_checksum=0)
-            await eventually(lambda: [fault.what.id for fault in station.lines[-1].faults] == [line.BAD_LOT.id])
+            await until(lambda: [fault.what.id for fault in station.lines[-1].faults] == [line.BAD_LOT.id])
             await plc.drop("latch_lot")
             await plc.beat(3, b"LOT 7")
             await plc.set("latch_lot")
@@ -156,7 +156,7 @@ def test_a_lot_with_a_barcode_readers_cr_fails_its_latch_and_nothing_else(cell, 
     asyncio.run(scenario())
 
 
-def test_no_fruit_is_begun_while_the_reject_gate_cannot_divert_it(cell, eventually):
+def test_no_fruit_is_begun_while_the_reject_gate_cannot_divert_it(cell, until):
     """An interface that this machine does not have: told to the station, and every trigger is refused."""
 
     async def scenario():
@@ -165,7 +165,7 @@ def test_no_fruit_is_begun_while_the_reject_gate_cannot_divert_it(cell, eventual
             await plc.wait("online")
             await plc.write(control=0)
             await plc.set("enable")
-            await eventually(lambda: station.lines[-1].faults)
+            await until(lambda: station.lines[-1].faults)
             (fault,) = station.lines[-1].faults
             assert fault.part == "can"
             assert fault.what.id == can.NOT_OPENED.id
@@ -197,7 +197,7 @@ def test_eight_results_wait_and_none_is_dropped(cell):
     asyncio.run(scenario())
 
 
-def test_bits_that_the_plc_forgets_block_nothing(cell, eventually, limit_s):
+def test_bits_that_the_plc_forgets_block_nothing(cell, until, limit_s):
     async def scenario():
         async with cell(handshake_handshake_timeout_s=limit_s) as made:
             station, plc = made.station, await made.plc()
@@ -221,7 +221,7 @@ def test_bits_that_the_plc_forgets_block_nothing(cell, eventually, limit_s):
             await plc.set("latch_lot", lot="A")
             await plc.wait("lot_latched")
             await plc.wait(without="lot_latched")
-            await eventually(lambda: len(station.lines[-1].faults) == 4)
+            await until(lambda: len(station.lines[-1].faults) == 4)
             assert {fault.what.id for fault in station.lines[-1].faults} == {
                 line.TRIGGER_NOT_RESET.id,
                 line.ACKNOWLEDGE_NOT_RESET.id,
@@ -233,7 +233,7 @@ def test_bits_that_the_plc_forgets_block_nothing(cell, eventually, limit_s):
     asyncio.run(scenario())
 
 
-def test_a_plc_that_stands_still_or_goes_is_disarmed_and_its_results_are_kept(cell, eventually, limit_s):
+def test_a_plc_that_stands_still_or_goes_is_disarmed_and_its_results_are_kept(cell, until, limit_s):
     async def scenario():
         async with cell(handshake_plc_heartbeat_timeout_s=limit_s) as made:
             station, plc = made.station, await made.plc()
@@ -241,8 +241,8 @@ def test_a_plc_that_stands_still_or_goes_is_disarmed_and_its_results_are_kept(ce
             await plc.trigger(1)
             await plc.write(plc_heartbeat=1)
             await plc.write(plc_heartbeat=2)
-            await eventually(lambda: station.lines[-1].plc_alive)
-            await eventually(lambda: not station.lines[-1].plc_alive and station.lines[-1].enable_withdrawn)
+            await until(lambda: station.lines[-1].plc_alive)
+            await until(lambda: not station.lines[-1].plc_alive and station.lines[-1].enable_withdrawn)
             assert not station.lines[-1].enabled
             station.finish("FAIL", Reason.AREA_OVER_LIMIT)
             await plc.wait("result_valid", without="trigger_ready")
@@ -250,7 +250,7 @@ def test_a_plc_that_stands_still_or_goes_is_disarmed_and_its_results_are_kept(ce
             assert (await plc.trigger(2))["last_refusal"] == "not_enabled"
             await plc.arm("buffer_results")
             plc.close()
-            await eventually(lambda: not station.lines[-1].plc_connected)
+            await until(lambda: not station.lines[-1].plc_connected)
             assert station.lines[-1].enable_withdrawn
             again = await made.plc()
             seen = await again.wait("result_valid", result_trigger_id=1)
@@ -276,7 +276,7 @@ def test_a_second_writer_is_refused(cell):
     asyncio.run(scenario())
 
 
-def test_a_station_that_dies_while_it_inspects(cell, eventually, limit_s):
+def test_a_station_that_dies_while_it_inspects(cell, until, limit_s):
     async def scenario():
         async with cell(handshake_station_lost_after_s=limit_s) as made:
             station, plc = made.station, await made.plc()
@@ -299,7 +299,7 @@ def test_a_station_that_dies_while_it_inspects(cell, eventually, limit_s):
             await station.start()
             back = await plc.wait("online", "result_valid", "trigger_ready", result_trigger_id=1, station_boots=2)
             assert back["result_reasons"] == {"station_lost"}
-            await eventually(lambda: 101 in station.published)
+            await until(lambda: 101 in station.published)
             assert station.published[101].reasons == (Reason.STATION_LOST,)
             await plc.write(acknowledged_sequence=101)
             await plc.trigger(3)
@@ -308,7 +308,7 @@ def test_a_station_that_dies_while_it_inspects(cell, eventually, limit_s):
             station.healthy = False
             beats = len(station.lines)
             still = await plc.read()
-            await eventually(lambda: len(station.lines) > beats + 5)
+            await until(lambda: len(station.lines) > beats + 5)
             first = (await plc.wait("error"))["station_heartbeat"]
             assert (first - still["station_heartbeat"]) % 2**16 <= 2
 
@@ -342,7 +342,7 @@ def test_a_fruit_stays_until_the_station_has_let_it_go(cell, limit_s):
     asyncio.run(scenario())
 
 
-def test_a_result_that_comes_too_late_is_not_shown(cell, eventually):
+def test_a_result_that_comes_too_late_is_not_shown(cell, until):
     async def scenario():
         async with cell(handshake_result_margin_s=0.1) as made:
             station, plc = made.station, await made.plc()
@@ -353,17 +353,17 @@ def test_a_result_that_comes_too_late_is_not_shown(cell, eventually):
             late = await plc.wait("result_valid")
             assert (late["result_outcome"], late["result_reasons"]) == ("NO_RESULT", {"late"})
             assert late["result_flags"] == {"late", "partial", "simulated"}
-            await eventually(lambda: running in station.published)
+            await until(lambda: running in station.published)
             station.running = running
             station.finish("PASS")
-            await eventually(lambda: "which stands" in made.log.read_text())
+            await until(lambda: "which stands" in made.log.read_text())
             assert (await plc.read())["result_outcome"] == "NO_RESULT"
             assert (await plc.group("counters"))["count_late"] == 1
 
     asyncio.run(scenario())
 
 
-def test_an_interface_that_is_killed_continues_where_it_was(cell, eventually):
+def test_an_interface_that_is_killed_continues_where_it_was(cell, until):
     async def scenario():
         async with cell() as made:
             station, plc = made.station, await made.plc()
@@ -374,7 +374,7 @@ def test_an_interface_that_is_killed_continues_where_it_was(cell, eventually):
                 station.finish("PASS")
                 await plc.wait(waiting_results=trigger_id)
             await plc.write(acknowledged_sequence=101)
-            await eventually(lambda: station.acknowledged == 101)
+            await until(lambda: station.acknowledged == 101)
             before = await plc.read()
             await plc.trigger(3)
             assert await made.end(signal.SIGKILL) == -signal.SIGKILL
@@ -460,7 +460,7 @@ def test_the_end_is_orderly_and_a_second_interface_is_one_sentence(cell):
     asyncio.run(scenario())
 
 
-def test_a_note_that_is_spoilt_on_its_way_is_given_again(cell, eventually):
+def test_a_note_that_is_spoilt_on_its_way_is_given_again(cell, until):
     async def scenario():
         async with cell() as made:
             station, plc = made.station, await made.plc()
@@ -469,10 +469,10 @@ def test_a_note_that_is_spoilt_on_its_way_is_given_again(cell, eventually):
             station.spoilt_notes = 1
             station.finish("PASS")
             await plc.wait("result_valid")
-            await eventually(lambda: 101 in station.published)
+            await until(lambda: 101 in station.published)
             station.spoilt_notes = 1
             await plc.write(acknowledged_sequence=101)
-            await eventually(lambda: station.acknowledged == 101)
+            await until(lambda: station.acknowledged == 101)
 
     asyncio.run(scenario())
 

@@ -14,6 +14,7 @@ from station.inspection.states import State
 from station.messages import commands
 from station.runtime.production import plc_commands
 from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, publish
+from tests.eventually import until
 
 # No alarm more than twice: one that comes a third time within a minute chatters, and stays.
 WATCHED = {
@@ -39,18 +40,6 @@ LOOKED_AT = [
 ]
 
 
-@pytest.fixture
-def until():
-    """Poll with a deadline."""
-
-    async def poll(holds):
-        async with asyncio.timeout(60):
-            while not holds():
-                await asyncio.sleep(0.02)
-
-    return poll
-
-
 def caused(cell, alarm):
     return cell.station.service.alarms.alarms.get(alarm).state in CAUSED
 
@@ -63,7 +52,7 @@ def active(cell):
 
 
 @pytest.mark.parametrize("device", list(WATCHED))
-def test_a_device_is_watched_while_nothing_is_inspected(bench, until, device):
+def test_a_device_is_watched_while_nothing_is_inspected(bench, device):
     async def scenario():
         async with bench() as cell:
             await cell.choose("blueberry")
@@ -79,7 +68,7 @@ def test_a_device_is_watched_while_nothing_is_inspected(bench, until, device):
     asyncio.run(scenario())
 
 
-def test_a_reference_that_cannot_serve_says_what_is_wrong_with_the_gel(bench, until):
+def test_a_reference_that_cannot_serve_says_what_is_wrong_with_the_gel(bench):
     async def scenario():
         # The last fog changes the light by 10 to 14 levels, as the twin's light drifts: over half of this limit.
         async with bench(reference={"most_drift_levels": 18.0}) as cell:
@@ -104,7 +93,7 @@ def test_a_reference_that_cannot_serve_says_what_is_wrong_with_the_gel(bench, un
     asyncio.run(scenario())
 
 
-def test_what_the_supervisor_tells_of_restarts_is_counted_and_many_are_an_alarm(bench, until, tmp_path, monkeypatch):
+def test_what_the_supervisor_tells_of_restarts_is_counted_and_many_are_an_alarm(bench, tmp_path, monkeypatch):
     file = tmp_path / "restarts.json"
     monkeypatch.setenv(RESTARTS_VARIABLE, str(file))
     now_s = time.monotonic()
@@ -133,7 +122,7 @@ def test_what_the_supervisor_tells_of_restarts_is_counted_and_many_are_an_alarm(
     asyncio.run(scenario())
 
 
-def test_an_under_voltage_of_the_gripper_stands_until_a_person_has_said_that_the_jaws_are_clear(bench, until):
+def test_an_under_voltage_of_the_gripper_stands_until_a_person_has_said_that_the_jaws_are_clear(bench):
     async def scenario():
         async with bench() as cell:
             await cell.choose("blueberry")
@@ -153,7 +142,7 @@ def test_an_under_voltage_of_the_gripper_stands_until_a_person_has_said_that_the
     asyncio.run(scenario())
 
 
-def test_an_emergency_stop_that_the_gripper_tells_of_is_a_persons(bench, until):
+def test_an_emergency_stop_that_the_gripper_tells_of_is_a_persons(bench):
     async def scenario():
         async with bench() as cell:
             await cell.choose("blueberry")
@@ -176,7 +165,7 @@ def test_an_emergency_stop_that_the_gripper_tells_of_is_a_persons(bench, until):
     asyncio.run(scenario())
 
 
-def test_a_reset_that_a_lost_camera_delays_ends_the_stops_alarm_once_the_station_is_ready(bench, until, monkeypatch):
+def test_a_reset_that_a_lost_camera_delays_ends_the_stops_alarm_once_the_station_is_ready(bench, monkeypatch):
     async def scenario():
         async with bench() as cell:
             await cell.choose("blueberry")
@@ -213,7 +202,7 @@ def test_a_reset_of_a_ready_station_ends_what_is_latched(bench):
     asyncio.run(scenario())
 
 
-def test_little_space_on_the_disk_is_told_before_it_is_too_little(bench, until, monkeypatch):
+def test_little_space_on_the_disk_is_told_before_it_is_too_little(bench, monkeypatch):
     free_mb = 3.0
 
     def disk_usage(_path):
