@@ -40,6 +40,7 @@ from station.supervision.supervisor import Program, Supervisor
 from station.twin.console import ask
 
 from .clock import CannotDoError, ShiftedClock
+from .quick_recipe import JUDGED, values_with
 from .routes import Routes
 from .scenario import ClockFault, DeviceFault, DiskFault, Fault, NestFault, Phase, PlcFault, ProcessFault, Scenario
 from .wire import Wire
@@ -318,16 +319,17 @@ def _free_ports(count: int) -> list[int]:
 def _quick_recipes(folder: Path, measured: str, limit_mm2: float) -> Path:
     """The shipped recipe with few steps: the matrix is about faults, not about fruit."""
     folder.mkdir()
-    values = load_recipes()[FRUIT].model_dump(mode="json")
-    values["steps"] |= {"number": 6, "result_closings_mm": [3], "closing_limit_mm": 6.0, "measured": measured}
-    values["imaging"] |= {"settle_s": 0.05, "frames_per_step": 2}
-    values["damage"]["growth_mm2_per_mm"] = 60
-    # The unit is not calibrated and no grader tells a size: by a usual coverage no fruit would pass.
-    values["damage"].pop("size", None)
-    values["damage"]["uncertainty"] = {"coverage": 0.6, "repeatability": [{"closing_mm": 3.0, "relative": 0.03}]}
+    changes = {
+        "steps.number": 6,
+        "steps.result_closings_mm": [3],
+        "steps.closing_limit_mm": 6.0,
+        "steps.measured": measured,
+        "imaging.settle_s": 0.05,
+        "imaging.frames_per_step": 2,
+        **JUDGED,
+    }
+    values = values_with(load_recipes()[FRUIT], changes)
     values["damage"]["area"][-1]["area_mm2"] = limit_mm2
-    values["early_stop"] = {"area_mm2": 150, "growth_mm2_per_mm": 90}
-    values["expected_width"]["largest_mm"] = min(values["expected_width"]["largest_mm"], 42.0)
     (folder / f"{FRUIT}.yaml").write_text(json.dumps(values), encoding="utf-8")
     return folder
 

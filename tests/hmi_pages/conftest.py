@@ -22,6 +22,7 @@ import psutil
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
+from benchmarks.reliability.quick_recipe import few_steps
 from hmi.api.tokens import ApiTokens
 from hmi.web.roles import Role
 from hmi.web.user_store import UserStore
@@ -43,7 +44,7 @@ from station.channel.line import (
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
-from station.settings.recipe import recipe_files
+from station.settings.recipe import load_recipes, recipe_files
 from station.settings.recipe_text import with_values
 from station.twin.console import ask
 from station.vocabulary import Reason
@@ -51,6 +52,7 @@ from tests.chromium import ARGUMENTS
 from tests.eventually import eventually as poll
 from tests.hosts import fresh_host
 from tests.ports import free_port
+from tests.quick_recipes import NUMBERS
 from tests.slower_mode import SLOWER_MODE
 
 PATIENCE_S = 120.0
@@ -76,25 +78,11 @@ def eventually_fixture() -> Callable[..., Any]:
 def quick_recipes(folder: Path) -> Path:
     """The shipped recipes, comments and all, with few, hasty steps."""
     folder.mkdir()
+    shipped = load_recipes()
     for file in recipe_files():
         text = file.read_text(encoding="utf-8")
-        if file.stem in {"strawberry", "raspberry", "blueberry"}:
-            changes = {
-                "steps.number": 4,
-                "steps.result_closings_mm": [1.9, 3] if file.stem == "strawberry" else [3],
-                "steps.closing_limit_mm": 4.5,
-                "imaging.settle_s": 0.02,
-                "imaging.frames_per_step": 1,
-                "imaging.reference_frames": 3,
-                "damage.growth_mm2_per_mm": 60,
-                # The unit is not calibrated and no grader tells a size: by a usual coverage no fruit would pass.
-                "damage.size": None,
-                "damage.uncertainty.coverage": 0.6,
-                "damage.uncertainty.repeatability": [{"closing_mm": 3.0, "relative": 0.03}],
-                "early_stop.area_mm2": 150,
-                "early_stop.growth_mm2_per_mm": 90,
-            }
-            text, _ = with_values(text, changes, str(file))
+        if file.stem in NUMBERS:
+            text, _ = with_values(text, few_steps(shipped[file.stem]), str(file))
         (folder / file.name).write_text(text, encoding="utf-8")
     return folder
 
