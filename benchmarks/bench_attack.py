@@ -26,7 +26,7 @@ from attack.bystanders import HOST, Browser
 from attack.document import BACK_S, MOST_FILES_LEFT, MOST_GROWN_MB, Process, Row, markdown
 from attack.target import Attack, Found, Target
 from bench_hmi import demo, until
-from bench_plc import free_port
+from monitoring.ports import free_port
 
 from hmi.web.roles import Role
 from station.settings.hmi import panel_endpoint

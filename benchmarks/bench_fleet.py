@@ -25,8 +25,8 @@ from archive import postgres
 from fleet import cohort, metrics_year, plain, stations, year
 from monitoring.asking import dashboards, panels, promql, sql
 from monitoring.document import with_part
+from monitoring.ports import free_ports
 from monitoring.prometheus import Prometheus, missing, promtool, running, write_configuration
-from monitoring.site import ports
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "fleet.md"
 STATIONS = 10
@@ -54,7 +54,7 @@ class Part(NamedTuple):
 
 def live(number_of: int) -> Part:
     """Whole stations at once."""
-    free = ports(4 * number_of)
+    free = free_ports(4 * number_of)
     with tempfile.TemporaryDirectory() as name, database() as server:
         folder = Path(name)
         cells = [

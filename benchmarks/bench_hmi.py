@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import psutil
-from bench_plc import built, free_port
+from bench_plc import built
 from looking.peer import nicegui, peer_browsers
 from looking.pictures import draw
 from looking.rounds import (
@@ -40,6 +40,7 @@ from looking.rounds import (
     differences,
     table,
 )
+from monitoring.ports import free_port
 from playwright.sync_api import Browser, sync_playwright
 
 from station.settings.configuration import Configuration, load_configuration

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import psutil
+from monitoring.ports import free_port
 
 from plc_interface.process.real_time import request_real_time_priority
 from plc_interface.server import connection
@@ -96,13 +97,6 @@ def built(name: str, folder: Path, *libraries: str) -> Path:
     source = ROOT / "benchmarks" / "plc" / f"{name}.c"
     subprocess.run(["gcc", "-O2", "-I/usr/include/modbus", "-o", program, source, *libraries], check=True)
     return program
-
-
-def free_port() -> int:
-    """A port that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind((HOST, 0))
-        return probe.getsockname()[1]
 
 
 def wait_for(port: int) -> None:

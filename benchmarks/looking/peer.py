@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
-from bench_plc import free_port
+from monitoring.ports import free_port
 from playwright.sync_api import Browser
 
 LOCK, PROGRAM = Path(__file__).with_name("nicegui.lock"), Path(__file__).with_name("nicegui_page.py")

@@ -4,7 +4,6 @@ import json
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import time
 import urllib.error
@@ -16,6 +15,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
+
+from .ports import free_port
 
 SHIPPED = Path(__file__).resolve().parents[2] / "deploy" / "prometheus"
 RULES = SHIPPED / "rules"
@@ -147,9 +148,7 @@ def running(folder: Path, configuration: Path, *options: str) -> Iterator[Promet
         configuration: see `write_configuration`.
         options: further ones of its command line.
     """
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     command = [
         "prometheus", f"--config.file={configuration}", f"--storage.tsdb.path={folder / 'data'}",
         f"--web.listen-address=127.0.0.1:{port}", *options,

@@ -4,7 +4,6 @@ import json
 import math
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -20,6 +19,7 @@ from station.calibration.model import Calibration, FieldMap, Noise, Verification
 from station.calibration.store import CalibrationStore
 from station.records.database import FILE_NAME
 
+from .ports import free_ports
 from .prometheus import Prometheus, running, write_configuration
 
 STATION = "station-1"
@@ -51,15 +51,6 @@ class Site:
     """When that was; nothing was scraped much later."""
 
 
-def ports(count: int) -> list[int]:
-    """So many different loopback ports that nobody listens on."""
-    with ExitStack() as stack:
-        probes = [stack.enter_context(socket.socket()) for _ in range(count)]
-        for probe in probes:
-            probe.bind(("127.0.0.1", 0))
-        return [probe.getsockname()[1] for probe in probes]
-
-
 @contextmanager
 def demonstration(folder: Path, server: Any, fruits: int, host: str) -> Iterator[Site]:
     """Run the demonstration under a Prometheus that is still there when it has ended.
@@ -70,7 +61,7 @@ def demonstration(folder: Path, server: Any, fruits: int, host: str) -> Iterator
         fruits: how many are inspected.
         host: a loopback address of its own for arm and gripper.
     """
-    modbus, metrics, hmi, camera, console = ports(5)
+    modbus, metrics, hmi, camera, console = free_ports(5)
     values = {
         "modbus": {"port": modbus},
         "metrics": {"port": metrics},

@@ -16,8 +16,9 @@ from typing import NamedTuple
 
 from archive.many import fill
 from archive.postgres import PORT, Server, programs, throwaway
-from bench_plc import HOST, free_port, wait_for
+from bench_plc import HOST, wait_for
 from looking.rounds import clients
+from monitoring.ports import free_port
 
 from plc_interface.plc_simulator.nest import LaidFruit, TwinNest
 from plc_interface.plc_simulator.program import LineProgram
