@@ -5,11 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from station.cli import cli
-from station.errors import BadInputError, StationError
 from station.settings.recipe import recipe_files
+from tests.command_line import call
 
 
 @pytest.fixture
@@ -32,15 +30,6 @@ def station(site: Path, home: Path, monkeypatch: pytest.MonkeyPatch) -> Callable
     """Call the command line: its exit code, and what it said."""
     monkeypatch.setenv("STATION_HOME", str(home))
     monkeypatch.setenv("STATION_RECIPES_FOLDER", str(site))
-
-    def call(*arguments: object) -> tuple[int, str]:
-        done = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-        if isinstance(done.exception, StationError):
-            return (2 if isinstance(done.exception, BadInputError) else 1), str(done.exception)
-        if done.exception is not None and not isinstance(done.exception, SystemExit):
-            raise done.exception
-        return done.exit_code, done.output
-
     return call
 
 

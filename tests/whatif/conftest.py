@@ -13,10 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from station.cli import cli
-from station.errors import BadInputError, StationError
 from station.inspection.judge import early_stop, judge
 from station.inspection.press import Measured, Press
 from station.records.model import CurvePoint, Image, InspectionRecord, RecipeSnapshot, Trigger
@@ -25,6 +22,7 @@ from station.settings.recipe import find_recipe
 from station.settings.recipe_model import Recipe
 from station.settings.records import RecordsSettings
 from station.vocabulary import Reason
+from tests.command_line import call
 
 RECIPES = Path(__file__).parents[1] / "recipe_store" / "golden" / "form_1"
 MM_PER_PX = 0.03
@@ -148,15 +146,6 @@ def station(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tu
     """Call the command line: its exit code, and what it said."""
     monkeypatch.setenv("STATION_RECIPES_FOLDER", str(RECIPES))
     monkeypatch.setenv("STATION_HOME", str(tmp_path / "home"))
-
-    def call(*arguments: object) -> tuple[int, str]:
-        done = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-        if isinstance(done.exception, StationError):
-            return (2 if isinstance(done.exception, BadInputError) else 1), str(done.exception)
-        if done.exception is not None and not isinstance(done.exception, SystemExit):
-            raise done.exception
-        return done.exit_code, done.output
-
     return call
 
 

@@ -6,12 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
 
-from station.cli import cli
-from station.errors import BadInputError, StationError
 from station.records.audit import AuditEntry, append_audit
 from station.records.direct_transaction import direct_transaction
+from tests.command_line import call
 
 
 @pytest.fixture
@@ -36,15 +34,6 @@ def trail(folder: Path) -> Callable[..., None]:
 def station(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str]]:
     """Call the command line: its exit code, and what it said."""
     monkeypatch.setenv("STATION_HOME", str(tmp_path / "home"))
-
-    def call(*arguments: str) -> tuple[int, str]:
-        done = CliRunner().invoke(cli, arguments)
-        if isinstance(done.exception, StationError):
-            return (2 if isinstance(done.exception, BadInputError) else 1), str(done.exception)
-        if done.exception is not None and not isinstance(done.exception, SystemExit):
-            raise done.exception
-        return done.exit_code, done.output
-
     return call
 
 

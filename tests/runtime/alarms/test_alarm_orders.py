@@ -4,16 +4,14 @@ import asyncio
 import time
 
 import pytest
-from click.testing import CliRunner
 
 from station.channel.line import CommandDone, CommandName, Line, StationState
 from station.channel.messages import RefusedError
 from station.channel.panel import AcknowledgeAlarm, AlarmList, ListAlarms, ShelveAlarm
-from station.cli import cli
-from station.errors import StationError
 from station.inspection.alarm_table import ALARMS, AlarmId
 from station.messages import alarm_commands as messages
 from station.runtime.production import housekeeping
+from tests.command_line import call
 
 BIT = 1 << (ALARMS[AlarmId.NO_RECIPE].number - 1)
 
@@ -22,15 +20,8 @@ BIT = 1 << (ALARMS[AlarmId.NO_RECIPE].number - 1)
 def alarms(tmp_path):
     """Run a command of the line as a person would: its exit code, and what it said."""
 
-    def call(*arguments):
-        done = CliRunner().invoke(cli, [*arguments, "--config", str(tmp_path / "station.yaml")])
-        if done.exception is None or isinstance(done.exception, SystemExit):
-            return done.exit_code, done.output
-        assert isinstance(done.exception, StationError), done.exception
-        return done.exception.exit_code, str(done.exception)
-
     async def beside(*arguments):
-        return await asyncio.to_thread(call, *arguments)
+        return await asyncio.to_thread(call, *arguments, "--config", tmp_path / "station.yaml")
 
     return beside
 

@@ -1,0 +1,16 @@
+"""The station's command line, called in this process."""
+
+from click.testing import CliRunner
+
+from station.cli import cli
+from station.errors import StationError
+
+
+def call(*arguments: object) -> tuple[int, str]:
+    """Call a command, and return its exit code and what it said; of what it refuses, that alone."""
+    done = CliRunner().invoke(cli, [str(argument) for argument in arguments])
+    if isinstance(done.exception, StationError):
+        return done.exception.exit_code, str(done.exception)
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return done.exit_code, done.output
