@@ -1,7 +1,6 @@
 """`station analyze` through the command line."""
 
 import contextlib
-import csv
 import logging
 import os
 import pty
@@ -17,15 +16,12 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.tables import read_table
+
 WITHOUT_COVERAGE = {name: value for name, value in os.environ.items() if not name.startswith("COV")}
 """The environment of a program whose files are limited in size: the coverage's own file would be, too."""
 
 HEADER = ["image", "contact", "area_px", "area_mm2", "centroid_x_px", "centroid_y_px", "flags"]
-
-
-def read_table(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def test_a_folder_gives_rows_masks_sheet_and_report(press, analyze_apart, tmp_path):

@@ -1,6 +1,5 @@
 """A press is one measurement: its images are measured in order, each with the contact of the step before."""
 
-import csv
 import random
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,6 +22,7 @@ from station.vision.contact import Contact, StageSink, contact_from_mask
 from station.vision.methods import make_method
 from station.vision.press import PressTracker
 from station.vocabulary import Flag
+from tests.tables import read_table
 
 CLOSINGS_MM = (-2.0, -1.0, 0.5, 1.5, 2.5, 3.5, 4.5)
 BLUEBERRY = find_recipe("blueberry")
@@ -59,11 +59,6 @@ def add_press(place: Path, kind: Kind, seed: int) -> Path:
             cv2.imwrite(str(frames / f"second_{number}.png"), image)
             table.write(f"second_{number}.png,{width_mm:.3f}\n")
     return frames
-
-
-def read_table(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def followed(references: Sequence[np.ndarray], frames: Sequence[np.ndarray]) -> list[Contact]:

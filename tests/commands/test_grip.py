@@ -1,6 +1,5 @@
 """`station grip` against the twin, read by `station analyze`; and what comes of a grip when something fails."""
 
-import csv
 import signal
 from itertools import pairwise
 
@@ -12,13 +11,9 @@ from station.devices.arm.faults import ArmCause, ArmFault
 from station.messages import arm as arm_messages
 from station.messages import camera as camera_messages
 from station.messages import grip as messages
+from tests.tables import read_table
 
 OPEN_MM = 53.0
-
-
-def table(path):
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def test_a_grip_with_the_arm_gives_what_analyze_reads(make_cell, analyze, tmp_path):
@@ -26,7 +21,7 @@ def test_a_grip_with_the_arm_gives_what_analyze_reads(make_cell, analyze, tmp_pa
     out = tmp_path / "grip"
     done = cell.station("grip", "--recipe", "raspberry", "--out", out)
     assert done.returncode == 0, done.stderr
-    rows = table(out / "widths.csv")
+    rows = read_table(out / "widths.csv")
     widths = [float(row["width_mm"]) for row in rows]
     assert len(rows) == 18
     assert widths == sorted(widths, reverse=True)
@@ -42,7 +37,7 @@ def test_a_grip_with_the_arm_gives_what_analyze_reads(make_cell, analyze, tmp_pa
         "--out", report, out / "frames",
     )  # fmt: skip
     assert read.returncode == 0, read.stderr
-    contacts = [row["contact"] for row in table(report / "results.csv")]
+    contacts = [row["contact"] for row in read_table(report / "results.csv")]
     assert contacts[0] == "0"
     assert contacts[1] == "1"
 
@@ -51,7 +46,7 @@ def test_on_a_bench_no_arm_is_asked(make_cell, tmp_path):
     cell = make_cell("--bench", "--fruit", "rubber_ball")
     done = cell.station("grip", "--bench", "--recipe", "rubber_ball", "--out", tmp_path / "grip")
     assert done.returncode == 0, done.stderr
-    rows = table(tmp_path / "grip" / "widths.csv")
+    rows = read_table(tmp_path / "grip" / "widths.csv")
     assert float(rows[0]["width_mm"]) == pytest.approx(46, abs=0.4)
     assert float(rows[-1]["width_mm"]) == pytest.approx(33, abs=0.4)
     assert len(rows) == 14

@@ -4,7 +4,6 @@
 """
 
 import asyncio
-import csv
 import math
 import struct
 from itertools import groupby
@@ -15,17 +14,13 @@ import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
 from plc_interface.registers.map import BY_NAME, MAP_VERSION
+from tests.tables import read_table
 
 PUBLISHED = sorted((Path(__file__).parent / "published").glob("*.csv"))
 FORMATS = {
     "u16": "H", "i16": "h", "bits16": "H", "u32": "I", "i32": "i", "f32": "f", "bits32": "I", "u64": "Q",
 }  # fmt: skip
 DEADLINE_S = 20.0
-
-
-def rows_of(path):
-    with path.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
 
 
 def numbered(cell):
@@ -35,7 +30,7 @@ def numbered(cell):
 
 @pytest.fixture(params=PUBLISHED, ids=lambda path: path.stem)
 def rows(request):
-    return rows_of(request.param)
+    return read_table(request.param)
 
 
 def test_what_was_published_is_where_it_was_and_what_it_was(rows):
