@@ -13,7 +13,7 @@ from installer.programs import LONG_S, own, station
 
 LAST_BACKUP = "last_backup"
 """An empty file of the home folder; its time is that of the last complete backup, which the station exports."""
-_OF_THE_CELL = frozenset({"held_for_a_person", "stopped_by_a_person", "mode", "plc", "active_recipe.json"})
+_OF_THE_CELL = frozenset({"held_for_a_person", "stopped_by_a_person", "mode", "plc", "active_recipe.json", "named_lot"})
 """Whether a fruit is held, a person has stopped the station or works in the cell, what is open with the PLC, and which
 recipe and lot run."""
 LEFT_OUT = frozenset({"records", "run", "panel_jobs", "logs", LAST_BACKUP}) | _OF_THE_CELL

@@ -12,3 +12,11 @@ BAD_NAME = define(
 )
 NONE = define("lot.none", "no lot was started at the panel")
 ANOTHER = define("lot.another", "lot {lot} is over, and nothing was ended: lot {now} is under way by now")
+START_NOT_STORED = define(
+    "lot.start_not_stored",
+    "lot {lot} is started, but is lost at the next start: the home folder cannot be written; make it writable",
+)
+END_NOT_STORED = define(
+    "lot.end_not_stored",
+    "lot {lot} is ended, but continues at the next start: the home folder cannot be written; make it writable",
+)

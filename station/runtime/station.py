@@ -118,7 +118,7 @@ class Station:
             await service.registry.reopen(lambda: alarms.restore(records))
         self.recipes = book = ActiveRecipes(configuration.recipes_folder, kept)
         await asyncio.to_thread(book.read)
-        lots = LotManager(service, book, audit)
+        lots = LotManager(service, book, audit, kept)
         await asyncio.to_thread(lots.restore)
         audit.log(*start_entries(self.boot, configuration, kept, versions, self._broken))
         orders = PlcCommands(service, devices, book, lots, kept, observability)

@@ -162,6 +162,7 @@ def test_a_replacement_machine_is_restored_as_the_document_has_it(root, installe
         ("mode", "1", "3"),
         ("plc/journal.json", "1", ""),
         ("active_recipe.json", "then", ""),
+        ("named_lot", "A-17", ""),
     ):
         (lost.home / name).write_text(then)
         if now:
@@ -198,6 +199,7 @@ def test_a_replacement_machine_is_restored_as_the_document_has_it(root, installe
     assert (new.home / "mode").read_text() == "3"
     assert not (new.home / "plc").exists()
     assert not (new.home / "active_recipe.json").exists(), "a person chooses the recipe of the fruit that runs now"
+    assert not (new.home / "named_lot").exists(), "and starts the lot that runs now"
     after = new.settings.stat()
     assert (after.st_uid, after.st_gid) == (before.st_uid, before.st_gid)
     log = (tmp_path / "log").read_text()

@@ -17,8 +17,10 @@ from tests.hmi.test_security import log_in
 @pytest.fixture
 def station(pages, monkeypatch) -> OperatorCommands:
     """The station's commands behind the pages; an operator is logged in."""
-    nothing: Any = SimpleNamespace(stopped_by_person=False, log_command=lambda *_: None)
-    manager = LotManager(nothing, nothing, nothing)
+    nothing: Any = SimpleNamespace(
+        stopped_by_person=False, log_command=lambda *_: None, active=None, write=lambda *_: True
+    )
+    manager = LotManager(nothing, nothing, nothing, nothing)
     commands = OperatorCommands(nothing, nothing, nothing, manager, nothing, nothing)
 
     async def request(order, _reply, **_):

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 
+from station.channel.panel_live import LONGEST_LOT
 from station.errors import StationError
 from station.messages import lots as messages
 from station.messages.message import Message, message_of
@@ -10,15 +11,21 @@ from station.records.audit import STATION, AuditEntry
 from station.runtime.cycle.service import Service
 from station.runtime.observability.audit_logger import PLC, AuditLogger
 from station.runtime.recipes.active import ActiveRecipe, ActiveRecipes
+from station.state_files import StateFiles
+
+_NAMED = "named_lot"
 
 log = logging.getLogger(__name__)
 
 
 class LotManager:
-    """Current lot. Its recipe is frozen when it begins: a later approval, edit or retirement affects the next lot."""
+    """Current lot. Its recipe is frozen when it begins: a later approval, edit or retirement affects the next lot.
 
-    def __init__(self, service: Service, recipes: ActiveRecipes, audit: AuditLogger) -> None:
-        self._service, self._recipes, self._audit = service, recipes, audit
+    The state files store the lot and the name that a person gave: both outlast a restart.
+    """
+
+    def __init__(self, service: Service, recipes: ActiveRecipes, audit: AuditLogger, state_files: StateFiles) -> None:
+        self._service, self._recipes, self._audit, self._state_files = service, recipes, audit, state_files
         self._turn, self._file = asyncio.Lock(), asyncio.Lock()
         self._storing: asyncio.Task[bool] | None = None
         self.lot: str | None = None
@@ -31,7 +38,12 @@ class LotManager:
         """Reason why the last lot could not begin: number, name and content of the recipe do not match."""
 
     def restore(self) -> None:
-        """Continue the lot and the recipe of the previous start. Blocks for some milliseconds."""
+        """Continue the lot, its name and the recipe of the previous start. Blocks for some milliseconds."""
+        named = (self._state_files.read(_NAMED) or b"").decode("ascii", "replace")
+        if not named or is_lot_name(named):
+            self.named = named
+        else:
+            log.warning("the lot started at the panel is lost: %s has no lot's name", self._state_files.folder / _NAMED)
         remembered = self._recipes.restored()
         if remembered is None:
             return
@@ -55,9 +67,13 @@ class LotManager:
         self.plc_names = bool(named_by_plc)
         return named_by_plc or self.named
 
-    def set_lot(self, lot: str) -> None:
-        """Start a lot for a person, or end it by an empty name; the next fruit freezes the recipe in force again."""
+    async def set_lot(self, lot: str) -> bool:
+        """Start a lot for a person, or end it by an empty name, and return whether that is stored.
+
+        The next fruit freezes the recipe in force again.
+        """
         self.named, self.lot = lot, None
+        return await self._store()
 
     async def begin(self, lot: str) -> bool:
         """Begin a fruit of the PLC's lot. The first fruit of another lot freezes the active recipe's revision in force.
@@ -95,7 +111,7 @@ class LotManager:
             return True
 
     async def _store(self) -> bool:
-        """Store the active recipe and the lot for the next start, and return whether they are stored."""
+        """Store the active recipe, the lot and its name for the next start, and return whether they are stored."""
         # A write that outlasts its order is not left behind, or it could replace the next order's.
         self._storing = asyncio.create_task(self._store_last())
         return await asyncio.shield(self._storing)
@@ -103,8 +119,16 @@ class LotManager:
     async def _store_last(self) -> bool:
         """Make them durable; the last order's are what the file has at the end."""
         async with self._file:
-            active = self._service.active
-            return active is not None and await asyncio.to_thread(self._recipes.store_active, active, self.lot)
+            return await asyncio.to_thread(self._write, self.named, self._service.active, self.lot)
+
+    def _write(self, named: str, active: ActiveRecipe | None, lot: str | None) -> bool:
+        stored = self._state_files.write(_NAMED, named.encode())
+        return (active is None or self._recipes.store_active(active, lot)) and stored
+
+
+def is_lot_name(text: str) -> bool:
+    """Check that a person may start a lot with this name: the PLC could give it too."""
+    return bool(text.strip()) and len(text) <= LONGEST_LOT and text.isascii() and text.isprintable()
 
 
 def _audited(active: ActiveRecipe) -> dict[str, str | int]:

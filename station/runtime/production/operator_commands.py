@@ -22,7 +22,7 @@ from station.records.records import Records
 from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import ARM, DeviceManager
 from station.runtime.observability.audit_logger import AuditLogger
-from station.runtime.production.lots import LotManager
+from station.runtime.production.lots import LotManager, is_lot_name
 from station.runtime.production.plc_commands import PlcCommands
 
 AT_ONCE_S = 0.4
@@ -172,15 +172,14 @@ class OperatorCommands:
     async def _start_lot(self, name: str, grower: str) -> Message | None:
         if self._lots.plc_names:
             return lots.PLC_NAMES()
-        if not name.strip() or len(name) > LONGEST_LOT or not (name.isascii() and name.isprintable()):
+        if not is_lot_name(name):
             return lots.BAD_NAME(name=name, longest=LONGEST_LOT)
         if grower:
             try:
                 await self._records.change(lambda connection: start_lot(connection, name, grower))
             except RecordsError as error:
                 return message_of(error)
-        self._lots.set_lot(name)
-        return None
+        return None if await self._lots.set_lot(name) else lots.START_NOT_STORED(lot=name)
 
     async def _end_lot(self, name: str) -> Message | None:
         if not self._lots.named:
@@ -189,9 +188,9 @@ class OperatorCommands:
             return lots.ANOTHER(lot=name, now=self._lots.named)
         with contextlib.suppress(RecordsError):  # a lot without a grower was never registered
             await self._records.change(lambda connection: end_lot(connection, name))
-        if name == self._lots.named:  # another one may have been started meanwhile
-            self._lots.set_lot("")
-        return None
+        if name != self._lots.named:  # another one was started meanwhile
+            return None
+        return None if await self._lots.set_lot("") else lots.END_NOT_STORED(lot=name)
 
 
 def _under_way(entry: OperatorCommandView, request: OperatorCommand) -> bool:

@@ -2,6 +2,8 @@
 
 import asyncio
 import threading
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -26,7 +28,9 @@ from station.records.audit_head import read_head
 from station.records.audit_report import read_audit
 from station.records.database import reading, records_folder
 from station.runtime.production import operator_commands
+from station.runtime.production.lots import LotManager
 from station.settings.hmi import panel_endpoint
+from station.state_files import StateFiles
 from station.vocabulary import Reason, Refusal
 from tests.quick_recipes import NUMBERS
 
@@ -236,25 +240,139 @@ def test_the_end_of_a_lot_leaves_one_that_was_started_while_the_disk_was_slow(be
 
     async def scenario():
         async with bench() as cell:
-            configuration = cell.configuration
-            async with ChannelClient(panel_endpoint(configuration.hmi, configuration.home), "the station") as panel:
-
-                async def give(who, order, lot):
-                    request = OperatorCommand(person=Actor(who=who, role="operator"), order=order, argument=lot)
-                    return await panel.request(request, OperatorCommandView, deadline_s=20)
-
-                async def state():
-                    return await panel.request(GetPanelState(), PanelState, deadline_s=20)
-
-                assert (await give("Ida", OperatorCommandName.START_LOT, "A")).state == "done"
-                given = asyncio.create_task(give("Ida", OperatorCommandName.END_LOT, "A"))
-                assert await asyncio.to_thread(ending.wait, 60)
-                assert (await give("Bo", OperatorCommandName.START_LOT, "B")).state == "done"
-                may_end.set()
-                ticket = (await given).ticket
-                async with asyncio.timeout(60):
-                    while next(each for each in (await state()).orders if each.ticket == ticket).state != "done":
-                        await asyncio.sleep(0.02)
-                return (await state()).named_lot
+            assert (await give(cell, OperatorCommandName.START_LOT, "A")).state == "done"
+            given = asyncio.create_task(give(cell, OperatorCommandName.END_LOT, "A"))
+            assert await asyncio.to_thread(ending.wait, 60)
+            assert (await give(cell, OperatorCommandName.START_LOT, "B")).state == "done"
+            may_end.set()
+            assert (await given).state == "done"
+            return (await panel_state(cell)).named_lot
 
     assert asyncio.run(scenario()) == "B"
+
+
+@pytest.mark.timeout(240)
+def test_a_lot_started_at_the_panel_continues_over_a_restart_with_its_revision_and_an_ended_one_does_not(
+    bench, settings_file
+):
+    file = settings_file()
+
+    async def scenario():
+        async with bench(file) as cell:
+            await cell.choose("blueberry")
+            assert (await give(cell, OperatorCommandName.START_LOT, "A")).state == "done"
+            home, folder = cell.configuration.home, cell.configuration.recipes_folder
+            assert (home / "named_lot").read_text() == "A", "a kill from now on loses nothing"
+            fruit = [await inspected(cell, 900)]
+            editor, store = RecipeEditor(home, folder), RecipeStore(home, folder)
+            await asyncio.to_thread(editor.edit, "blueberry", {"damage.growth_mm2_per_mm": 55.0}, IDA)
+            await asyncio.to_thread(store.submit, "blueberry", IDA)
+            await asyncio.to_thread(store.approve, "blueberry", BO)
+        async with bench(file) as cell:
+            await cleared(cell, "blueberry")
+            assert (await panel_state(cell)).named_lot == "A"
+            fruit.append(await inspected(cell, 901))
+            assert (await give(cell, OperatorCommandName.END_LOT, "A")).state == "done"
+        async with bench(file) as cell:
+            await cleared(cell, "blueberry")
+            state = await panel_state(cell)
+            assert (state.named_lot, state.lot) == ("", None)
+            fruit.append(await inspected(cell, 902))
+        return [(each.lot, each.recipe.revision) for each in fruit]
+
+    assert asyncio.run(scenario()) == [("A", "1"), ("A", "1"), ("", "2")]
+
+
+def test_a_lot_that_cannot_be_stored_is_started_or_ended_and_said(bench, monkeypatch):
+    async def scenario():
+        async with bench() as cell:
+            monkeypatch.setattr(StateFiles, "write", lambda *_: False)
+            started = await give(cell, OperatorCommandName.START_LOT, "A")
+            assert (started.state, started.why) == ("failed", lots.START_NOT_STORED(lot="A"))
+            assert (await panel_state(cell)).named_lot == "A"
+            ended = await give(cell, OperatorCommandName.END_LOT, "A")
+            assert (ended.state, ended.why) == ("failed", lots.END_NOT_STORED(lot="A"))
+            assert (await panel_state(cell)).named_lot == ""
+
+    asyncio.run(scenario())
+
+
+def test_the_last_lot_is_what_the_file_has_also_where_the_disk_outlasts_the_order_before(tmp_path, monkeypatch):
+    begun, free, write = threading.Event(), threading.Event(), StateFiles.write
+
+    def slow_once(self, name, data):
+        if not begun.is_set():
+            begun.set()
+            assert free.wait(60)
+        return write(self, name, data)
+
+    monkeypatch.setattr(StateFiles, "write", slow_once)
+
+    async def scenario():
+        manager = lot_manager(tmp_path)
+        first = asyncio.create_task(manager.set_lot("A"))
+        assert await asyncio.to_thread(begun.wait, 60)
+        first.cancel()
+        await asyncio.gather(first, return_exceptions=True)
+        second = asyncio.create_task(manager.set_lot("B"))
+        await asyncio.wait({second}, timeout=0.3)  # one that did not wait for the first would be overtaken by it
+        free.set()
+        return await second
+
+    assert asyncio.run(scenario())
+    assert (tmp_path / "named_lot").read_bytes() == b"B"
+
+
+@pytest.mark.parametrize(
+    ("stored", "named"), [(b"A-17", "A-17"), (b"", ""), (b"\xff\xfe", ""), (b"A\n", ""), (b" ", ""), (33 * b"A", "")]
+)
+def test_a_file_without_a_lots_name_keeps_no_station_from_starting(tmp_path, stored, named):
+    (tmp_path / "named_lot").write_bytes(stored)
+    manager = lot_manager(tmp_path)
+    manager.restore()
+    assert manager.named == named
+
+
+def lot_manager(home):
+    """A lot manager of a station without a recipe."""
+    service: Any = SimpleNamespace(active=None)
+    nothing: Any = SimpleNamespace(restored=lambda: None)
+    return LotManager(service, nothing, nothing, StateFiles(home))
+
+
+async def cleared(cell, kind):
+    """Say after a start, as a person does on a bench, that the jaws are clear; the recipe is that of before."""
+    cell.twin.world.remove()
+    await cell.until(lambda: cell.phase in {State.UNKNOWN, State.HELD, State.IDLE})
+    done = await cell.line.order(CommandName.RESET)
+    assert done.done, done.why
+    cell.lay(kind)
+
+
+async def inspected(cell, trigger_id):
+    """One fruit for which the PLC names no lot; its trigger as the records have it."""
+    begun = await begin(cell, trigger_id, "")
+    assert begun.refusal is None, await cell.line.state()
+    await cell.line.publish(await cell.line.outcome(begun.sequence))
+    return (await cell.station.service.registry.records.inspection(begun.sequence)).trigger
+
+
+async def at_panel(cell, request, reply):
+    configuration = cell.configuration
+    async with ChannelClient(panel_endpoint(configuration.hmi, configuration.home), "the station") as panel:
+        return await panel.request(request, reply, deadline_s=20)
+
+
+async def panel_state(cell):
+    return await at_panel(cell, GetPanelState(), PanelState)
+
+
+async def give(cell, order, lot):
+    """Give an order at the panel, and return it once it has ended."""
+    request = OperatorCommand(person=Actor(who="Ida", role="operator"), order=order, argument=lot)
+    given = await at_panel(cell, request, OperatorCommandView)
+    async with asyncio.timeout(60):
+        while given.state == "executing":
+            await asyncio.sleep(0.02)
+            given = next(each for each in (await panel_state(cell)).orders if each.ticket == given.ticket)
+    return given
