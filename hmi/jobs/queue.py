@@ -6,6 +6,7 @@ priority.
 
 import asyncio
 import contextlib
+import json
 import logging
 import os
 import shutil
@@ -30,6 +31,8 @@ MOST_WAITING = 4
 _STOP_S = 5.0
 _LEAST_FREE_BYTES = 64 * 1024 * 1024
 _PROGRESS = "replayed.jsonl"
+_CONFIGURATION = "job.station.yaml"
+"""A job's own; no recipe's name has a dot."""
 _MEDIA = {
     ".csv": "text/csv; charset=utf-8",
     ".parquet": "application/vnd.apache.parquet",
@@ -93,10 +96,15 @@ class Job:
 
 
 class Jobs:
-    """Queue that runs one job after the other, with the command line that gets the arguments."""
+    """Queue that runs one job after the other, with the command line that gets the arguments.
 
-    def __init__(self, home: Path, command: Sequence[str] = (sys.executable, "-m", "station")) -> None:
+    Args:
+        station: the station's name, for reports.
+    """
+
+    def __init__(self, home: Path, station: str, command: Sequence[str] = (sys.executable, "-m", "station")) -> None:
         self._home, self._command = home, tuple(command)
+        self._configuration = json.dumps({"home": str(home), "outbox": {"station": station}})
         self._jobs: dict[str, Job] = {}
         self._turn = asyncio.Lock()
         self._cleared = False
@@ -117,7 +125,7 @@ class Jobs:
                 shutil.rmtree(folder.parent, ignore_errors=True)
                 self._cleared = True
             folder.mkdir(parents=True)
-            for name, text in files.items():
+            for name, text in {**files, _CONFIGURATION: self._configuration}.items():
                 (folder / name).write_text(text, encoding="utf-8")
             free_bytes = shutil.disk_usage(folder).free
         except OSError as error:
@@ -183,9 +191,10 @@ class Jobs:
 
     async def _run_command(self, job: Job) -> tuple[int, str]:
         """Return the exit code and the last output."""
+        # It needs two settings of the site's, and reads no file that may be broken by now.
         environment = {
             **{name: value for name, value in os.environ.items() if not name.startswith("STATION_")},
-            "STATION_HOME": str(self._home),
+            "STATION_CONFIG": str(job.folder / _CONFIGURATION),
             "OMP_NUM_THREADS": "1",
         }
         process = await asyncio.create_subprocess_exec(

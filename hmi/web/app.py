@@ -60,7 +60,7 @@ def make_context(site: Configuration, file: Path | None, broken: str) -> Hmi:
         settings=settings,
         gateway=gateway,
         past=Past(site, broken),
-        jobs=Jobs(site.home),
+        jobs=Jobs(site.home, site.outbox.station),
         sessions=Sessions(settings.idle_s),
         people=UserStore(site.home / FOLDER),
         pins=LoginRateLimiter(),

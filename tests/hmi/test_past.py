@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from hmi.web.app import make_context
 from hmi.web.roles import Role
 from station.inspection.alarm_table import ALARMS, AlarmId
 from station.recipe_store.history import Person, submit
@@ -15,6 +16,7 @@ from station.records.direct_transaction import direct_transaction
 from station.records.lots import start_lot
 from station.records.model import AlarmEntry, InspectionRecord, RecipeSnapshot, Trigger
 from station.records.records import Records
+from station.settings.configuration import load_configuration
 from station.settings.recipe import find_recipe, shipped_folder
 from station.settings.records import RecordsSettings
 from tests.hmi.test_security import log_in
@@ -55,6 +57,31 @@ def test_history_lots_and_audit_trail_are_there_while_the_station_is_away(pages,
         whole = json.loads(pages("GET", f"/api/v1/inspections/{fruit}")[2])
         assert (whole["outcome"], whole["lot"]) == ("FAIL", "A-17")
         assert json.loads(pages("GET", "/api/v1/lots/A-17")[2])["grower"] == "Meadow Farm"
+
+
+@pytest.mark.parametrize("in_home", [False, True])
+def test_a_lots_report_made_at_the_pages_names_its_station_also_while_its_file_is_broken(
+    fruit, tmp_path, tmp_path_factory, monkeypatch, in_home
+):
+    """The file of an installed station is not in its home folder."""
+    file = (tmp_path if in_home else tmp_path_factory.mktemp("etc")) / "station.yaml"
+    file.write_text("outbox: {station: line-7}")
+    monkeypatch.setenv("STATION_CONFIG", str(file))
+    monkeypatch.setenv("STATION_HOME", str(tmp_path))
+    jobs = make_context(load_configuration(), file, "").jobs
+    file.write_text("outbox: [")
+
+    async def reported() -> str:
+        folder = jobs.folder()
+        job = jobs.begin("lot_report", folder, ["records", "report", "--", "A-17", str(folder / "lot.html")])
+        assert job.task is not None
+        await job.task
+        assert job.state == "done", job.message
+        return (folder / "lot.html").read_text(encoding="utf-8")
+
+    html = asyncio.run(reported())
+    assert "A-17" in html
+    assert "line-7" in html
 
 
 def test_a_draft_that_this_program_refuses_is_shown_so_that_it_can_be_rejected(pages, tmp_path):

@@ -33,7 +33,7 @@ async def until(jobs: Jobs, job: str, wanted: Callable[[Job], Any]) -> Job:
 
 def with_jobs(home: Path, code: str, work: Callable[[Jobs], Any]) -> None:
     async def run() -> None:
-        jobs = Jobs(home, (sys.executable, "-c", code))
+        jobs = Jobs(home, "station-1", (sys.executable, "-c", code))
         try:
             await work(jobs)
         finally:
@@ -89,8 +89,8 @@ def test_a_job_called_off_ends_its_process_and_too_many_are_refused(tmp_path: Pa
 
 
 def test_folders_of_the_start_before_are_removed_and_none_of_this_one(tmp_path: Path) -> None:
-    before = Jobs(tmp_path).folder()
-    jobs = Jobs(tmp_path)
+    before = Jobs(tmp_path, "station-1").folder()
+    jobs = Jobs(tmp_path, "station-1")
     assert before.exists(), "of pages that have the port, perhaps"
     folders = [jobs.folder(), jobs.folder()]
     assert [folder.exists() for folder in (before, *folders)] == [False, True, True]
