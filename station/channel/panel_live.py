@@ -222,6 +222,7 @@ class PanelState(ChannelMessage):
     fruit_changes: int
     """Counts up with each new fruit, and with each whose outcome for the PLC became another one."""
     lot_counts: Counts
+    """Of the lot under way; before its first fruit, of the one that was started at the panel."""
     deadline_s: float | None
     """The longest that an inspection may take by the active recipe and settings."""
     setup: SetupView

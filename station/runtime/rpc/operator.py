@@ -143,7 +143,7 @@ class PanelServer:
             running_sequence=service.registry.running_sequence,
             last_sequence=self._inspections.last_sequence,
             fruit_changes=self._inspections.changes,
-            lot_counts=self._inspections.counts(self._lots.lot),
+            lot_counts=self._inspections.counts(self._lots.lot or self._lots.named),
             deadline_s=None if active is None else service.pacing.limits(active.recipe).inspection_s,
             setup=setup_view(self._configuration, self._devices),
         )

@@ -104,9 +104,9 @@ class RecentInspections:
             counted.subtract([before.outcome])
             counted.update([now.outcome])
 
-    def counts(self, lot: str | None) -> Counts:
-        """Count a lot's outcomes; for fruit without a lot, None, since this start of the station."""
-        counted = self._lots.get(lot or "", Counter())
+    def counts(self, lot: str) -> Counts:
+        """Count a lot's outcomes; of fruit without a lot, those since this start of the station."""
+        counted = self._lots.get(lot, Counter())
         return Counts(passed=counted["PASS"], failed=counted["FAIL"], unjudged=counted["NO_RESULT"])
 
     def recent(self, most: int) -> tuple[FruitSummary, ...]:

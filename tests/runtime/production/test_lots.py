@@ -12,6 +12,7 @@ from station.channel.line import Begin, BeginReply, CommandName
 from station.channel.messages import DeadlineError
 from station.channel.panel import Actor
 from station.channel.panel_live import (
+    Counts,
     GetPanelState,
     OperatorCommand,
     OperatorCommandName,
@@ -281,6 +282,20 @@ def test_a_lot_started_at_the_panel_continues_over_a_restart_with_its_revision_a
         return [(each.lot, each.recipe.revision) for each in fruit]
 
     assert asyncio.run(scenario()) == [("A", "1"), ("A", "1"), ("", "2")]
+
+
+def test_the_counts_are_those_of_the_lot_that_was_started_also_before_its_first_fruit(bench):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            await inspected(cell, 900)
+            before = (await panel_state(cell)).lot_counts
+            assert (await give(cell, OperatorCommandName.START_LOT, "A")).state == "done"
+            return before, (await panel_state(cell)).lot_counts
+
+    before, after = asyncio.run(scenario())
+    assert before.passed + before.failed + before.unjudged == 1
+    assert after == Counts()
 
 
 def test_a_lot_that_cannot_be_stored_is_started_or_ended_and_said(bench, monkeypatch):
