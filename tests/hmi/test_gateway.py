@@ -63,7 +63,7 @@ def test_the_button_that_aborts_a_fruit_is_the_running_ones(pages):
 
 def test_an_outcome_that_the_plc_was_given_in_place_of_the_stations_is_shown():
     async def scenario():
-        inspections, full = RecentInspections(), dict[str, Any](short=PASSED)
+        inspections, full = RecentInspections(lambda *_: {}), dict[str, Any](short=PASSED)
         inspections.restore([PASSED], [RestoredFruit(Fruit.model_construct(**full), None)], {"A": {"PASS": 1}})
         async with Station(inspections) as gateway:
             await gateway.polled()

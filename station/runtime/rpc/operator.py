@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import time
+from functools import partial
 
 from station.channel.line import Noted
 from station.channel.panel_live import (
@@ -36,7 +37,7 @@ from station.runtime.production.operator_commands import OperatorCommands
 from station.runtime.production.production import Production
 from station.runtime.recipes.active import ActiveRecipe
 from station.runtime.rpc.recent_inspections import RecentInspections
-from station.runtime.rpc.restored_inspections import read_recent
+from station.runtime.rpc.restored_inspections import read_counts, read_recent
 from station.runtime.rpc.setup import setup_view
 from station.settings.configuration import Configuration
 from station.vocabulary import Refusal
@@ -65,7 +66,7 @@ class PanelServer:
         self._operator_commands = OperatorCommands(
             self._plc_commands, self._service, self._devices, self._lots, records, audit
         )
-        self._inspections = RecentInspections()
+        self._inspections = RecentInspections(partial(read_counts, records.folder))
         self._heard_s: float | None = None
         self.flooded_by = ""
         """The address that floods the pages, as their process said last; empty for none."""
@@ -96,8 +97,9 @@ class PanelServer:
         self._inspections.restore(*found)
 
     async def close(self) -> None:
-        """Cancel the commands under way."""
+        """Cancel the commands under way, and what is still being read."""
         await self._operator_commands.close()
+        await self._inspections.close()
 
     def hmi_fault(self) -> Message | None:
         """Return the fault of the HMI's process; None for none, and before its first message."""

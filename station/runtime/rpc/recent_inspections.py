@@ -2,6 +2,7 @@
 
 import asyncio
 import base64
+import logging
 from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from station.channel.panel_live import Counts, CurvePointSummary, Fruit, FruitSu
 from station.devices.camera.interface import Image
 from station.errors import StationError
 from station.messages import jobs as messages
+from station.records.errors import RecordsError
 from station.records.judgement import limit_factor
 from station.records.model import InspectionRecord
 from station.runtime.cycle.inspection import Inspection
@@ -27,6 +29,9 @@ MOST_IN_SHORT = 200
 _JPEG_QUALITY = 82
 _CORNER_PX = 1.0
 """Greatest distance of the outline's corners from the contact's edge."""
+_RETRY_S = 10.0
+
+log = logging.getLogger(__name__)
 
 
 class NotRecentError(StationError):
@@ -35,6 +40,8 @@ class NotRecentError(StationError):
 
 ReadStep = Callable[[], tuple[Image, Mask]]
 """Returns a step's image and the contact in it; blocks if they have to be read from the disk."""
+ReadCounts = Callable[[str, int], Mapping[str, int]]
+"""Returns the records' counts of a lot's outcomes, of its fruit below a sequence; blocks."""
 
 
 class RestoredFruit(NamedTuple):
@@ -53,12 +60,15 @@ class _Recent:
 
 
 class RecentInspections:
-    """Recent inspections in memory; the records have all of them."""
+    """Recent inspections in memory, and counts of the lots last inspected or shown; the records have all of them."""
 
-    def __init__(self) -> None:
+    def __init__(self, read_counts: ReadCounts) -> None:
+        self._read_counts = read_counts
         self._by_sequence: OrderedDict[int, _Recent] = OrderedDict()
         self._short: deque[FruitSummary] = deque(maxlen=MOST_IN_SHORT)
         self._lots: OrderedDict[str, Counter[str]] = OrderedDict()
+        """In the order of their last use."""
+        self._reading: set[asyncio.Task[None]] = set()
         self._turn = asyncio.Lock()
         self.changes = 0
         """Counts up with each new fruit and each other outcome."""
@@ -76,6 +86,12 @@ class RecentInspections:
         self._by_sequence.update((each.fruit.short.sequence, _Recent(each.fruit, each.look)) for each in full)
         self._lots.update((name, Counter(counts)) for name, counts in lots.items())
 
+    async def close(self) -> None:
+        """Cancel what is still being read."""
+        for task in self._reading:
+            task.cancel()
+        await asyncio.gather(*self._reading, return_exceptions=True)
+
     def add(self, now: Inspection) -> None:
         """Add an inspection with its durable outcome."""
         if now.standing is None:
@@ -86,9 +102,7 @@ class RecentInspections:
             self._by_sequence.popitem(last=False)
         self._short.append(fruit.short)
         self.changes += 1
-        self._lots.setdefault(fruit.short.lot, Counter())[fruit.short.outcome] += 1
-        while len(self._lots) > MOST_IN_FULL:
-            self._lots.popitem(last=False)
+        self._counted(fruit.short.lot, fruit.short.sequence)[fruit.short.outcome] += 1
 
     def set_outcome(self, outcome: Outcome) -> None:
         """Set the outcome that was published to the PLC; it overrides the station's own result."""
@@ -105,9 +119,38 @@ class RecentInspections:
             counted.update([now.outcome])
 
     def counts(self, lot: str) -> Counts:
-        """Count a lot's outcomes; of fruit without a lot, those since this start of the station."""
-        counted = self._lots.get(lot, Counter())
+        """Count a lot's outcomes; of fruit without a lot, those since this start of the station.
+
+        Earlier fruit of a lot that is not in memory are counted as soon as the records are read.
+        """
+        last = self.last_sequence
+        counted = Counter[str]() if last is None else self._counted(lot, last + 1)
         return Counts(passed=counted["PASS"], failed=counted["FAIL"], unjudged=counted["NO_RESULT"])
+
+    def _counted(self, lot: str, below: int) -> Counter[str]:
+        """Return a lot's counts; of one that is not in memory, its fruit below a sequence are read in a thread."""
+        counted = self._lots.get(lot)
+        if counted is None:
+            counted = self._lots[lot] = Counter()
+            if lot:
+                task = asyncio.create_task(self._read_earlier(lot, below, counted), name=f"counts of lot {lot}")
+                self._reading.add(task)
+                task.add_done_callback(self._reading.discard)
+        self._lots.move_to_end(lot)
+        while len(self._lots) > MOST_IN_FULL:
+            self._lots.popitem(last=False)
+        return counted
+
+    async def _read_earlier(self, lot: str, below: int, counted: Counter[str]) -> None:
+        """Add the counts of a lot's earlier fruit, which do not change any more; later fruit are counted meanwhile."""
+        while self._lots.get(lot) is counted:
+            try:
+                counted.update(await asyncio.to_thread(self._read_counts, lot, below))
+            except RecordsError as error:
+                log.warning("lot %s is shown without its earlier fruit: %s", lot, error)
+                await asyncio.sleep(_RETRY_S)
+            else:
+                return
 
     def recent(self, most: int) -> tuple[FruitSummary, ...]:
         """Return the last fruit, newest first."""

@@ -1,6 +1,7 @@
 """Recent inspections restored from the records after a start."""
 
 import json
+import sqlite3
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -42,7 +43,7 @@ _AREAS = (
 )
 _COUNTS = (
     "SELECT outcome, count(*) FROM inspections INDEXED BY ix_inspections_lot_outcome "
-    "WHERE lot = ? AND outcome NOT NULL GROUP BY outcome"
+    "WHERE lot = ? AND outcome NOT NULL AND sequence < ? GROUP BY outcome"
 )
 
 
@@ -72,8 +73,22 @@ def read_recent(folder: Path, deadline_s: Callable[[Recipe], float]) -> Restored
         short = tuple(short_view(Outcome.model_validate_json(row[1]), row[2], areas[row[0]]) for row in rows)
         full = (_full(connection, folder, each.sequence, deadline_s) for each in short[-MOST_IN_FULL:])
         named = list(dict.fromkeys(each.lot for each in reversed(short) if each.lot))[:MOST_IN_FULL]
-        lots = {lot: Counter(dict(database.execute(_COUNTS, (lot,)).fetchall())) for lot in reversed(named)}
+        lots = {lot: _counts(database, lot, short[-1].sequence + 1) for lot in reversed(named)}
         return RestoredInspections(short, tuple(each for each in full if each is not None), lots)
+
+
+def read_counts(folder: Path, lot: str, below: int) -> Counter[str]:
+    """Read the counts of a lot's outcomes, of its fruit below a sequence. Blocks for some milliseconds.
+
+    Raises:
+        RecordsError: the records cannot be read.
+    """
+    with reading(folder) as connection:
+        return _counts(plain(connection), lot, below)
+
+
+def _counts(database: sqlite3.Connection, lot: str, below: int) -> Counter[str]:
+    return Counter(dict(database.execute(_COUNTS, (lot, below)).fetchall()))
 
 
 def _full(
