@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Form, Path, Request
+from fastapi import APIRouter, Depends, Form, Path, Query, Request
 from starlette.responses import Response
 
 from hmi.web.access import HmiNow, LocaleNow, caller_of, orders
@@ -25,7 +25,7 @@ ENTRY = Entry("alarms", "/alarms")
 ACKNOWLEDGEABLE = frozenset({"unacknowledged", "returned", "latched_unacknowledged"})
 SHELVES_S = (600, 3600, 4 * 3600, 8 * 3600)
 REASONS = ("being_mended", "known", "nuisance")
-_LAST = 100
+_HISTORY_PAGE = 100
 Operator = Annotated[Caller, Depends(orders(Right.HANDLE_ALARMS))]
 AlarmName = Annotated[str, Path(pattern=r"^[a-z_]{1,40}$")]
 
@@ -50,9 +50,12 @@ async def alarms(request: Request) -> Response:
 
 
 @router.get("/alarms/history")
-async def history(request: Request, hmi: HmiNow) -> Response:
-    """Show recent changes of alarms."""
-    return show(request, "alarms_history.html.j2", changes=await hmi.past.alarm_changes(_LAST))
+async def history(
+    request: Request, hmi: HmiNow, below: Annotated[int | None, Query(ge=1, le=2**53)] = None
+) -> Response:
+    """Show a page of the changes of alarms."""
+    changes, older = await hmi.past.alarm_changes(_HISTORY_PAGE, below)
+    return show(request, "alarms_history.html.j2", changes=changes, older=older)
 
 
 @router.get("/alarms/{alarm}")

@@ -33,6 +33,7 @@ router = APIRouter(prefix="/history")
 ENTRY = Entry("history", "/history")
 DEADLINE_S = 20.0
 PAGE = 20
+_AUDIT_PAGE = 100
 _OUTCOMES = {"PASS": "pass", "FAIL": "fail", "NO_RESULT": "unjudged"}
 _LONGEST_GAP = 50
 _KEPT_STAGES = 3
@@ -141,13 +142,21 @@ async def report(hmi: HmiNow, caller: GenuineCaller, lot: Annotated[str, Form(ma
 
 
 @router.get("/audit")
-async def audit(request: Request, hmi: HmiNow, locale: LocaleNow, action: Words = "", subject: Words = "") -> Response:
-    """Show the latest rows of the audit trail, as sentences."""
-    found = await hmi.past.audit(100, action, subject)
+async def audit(
+    request: Request,
+    hmi: HmiNow,
+    locale: LocaleNow,
+    action: Words = "",
+    subject: Words = "",
+    below: Annotated[int | None, Query(ge=1, le=2**53)] = None,
+) -> Response:
+    """Show a page of the audit trail's rows, as sentences."""
+    found, older = await hmi.past.audit(_AUDIT_PAGE, action, subject, below)
     recipes = (await hmi.past.recipes.read()).states
     fruit = {each.recipe.plc_number: each.title for each in recipes if each.recipe is not None}
     rows = [(row, sentence(row, fruit, locale)) for row in found]
-    return show(request, "history_audit.html.j2", rows=rows, action=action, subject=subject)
+    terms = {"action": action, "subject": subject}
+    return show(request, "history_audit.html.j2", rows=rows, terms=terms, below=below, older=older)
 
 
 @router.get("/image/{sha256}.png")

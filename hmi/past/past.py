@@ -102,13 +102,26 @@ class Past:
         """Return the latest lots, newest first, or the one of a name."""
         return await self._read(lambda connection: read_lots(connection, limit, name=name))
 
-    async def audit(self, limit: int, action: str = "", subject: str = "") -> list[AuditRow]:
-        """Return the latest rows of actions that begin so and whose subject has this text, newest first."""
-        return await self._read(lambda connection: read_audit(connection, limit, action, subject)[::-1])
+    async def audit(
+        self, limit: int, action: str = "", subject: str = "", below: int | None = None
+    ) -> tuple[list[AuditRow], int | None]:
+        """Return a page of the rows of actions that begin so and whose subject has this text, newest first.
 
-    async def alarm_changes(self, limit: int) -> list[AlarmChange]:
-        """Return the latest changes of alarms, newest first."""
-        return await self._read(lambda connection: list(map(_alarm_change, read_alarm_log(connection, limit))))
+        Returns:
+            The rows, and the number that the next page is below; None if this is the last.
+        """
+        found = await self._read(lambda connection: read_audit(connection, limit + 1, action, subject, below)[::-1])
+        return found[:limit], found[limit - 1].seq if len(found) > limit else None
+
+    async def alarm_changes(self, limit: int, below: int | None = None) -> tuple[list[AlarmChange], int | None]:
+        """Return a page of the changes of alarms, newest first.
+
+        Returns:
+            The changes, and the number that the next page is below; None if this is the last.
+        """
+        found = await self._read(lambda connection: read_alarm_log(connection, limit + 1, below))
+        numbers, changes = list(found), [_alarm_change(entry) for entry in found.values()]
+        return changes[:limit], numbers[limit - 1] if len(numbers) > limit else None
 
     async def image(self, sha256: str) -> bytes:
         """Return one stored image, a PNG file."""

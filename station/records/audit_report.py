@@ -15,12 +15,15 @@ from station.records.texts import printable
 _LONGEST_VALUE = 300
 
 
-def read_audit(connection: Connection, number: int, action: str = "", subject: str = "") -> list[AuditRow]:
+def read_audit(
+    connection: Connection, number: int, action: str = "", subject: str = "", below: int | None = None
+) -> list[AuditRow]:
     """Read the last rows, oldest first.
 
     Args:
         action: rows of this action, or of all that start with it; if empty, all but the seals of inspections.
         subject: rows with this text in their subject; all if empty.
+        below: only rows before this one.
     """
     query = select(audit).order_by(audit.c.seq.desc()).limit(number)
     if action:
@@ -30,6 +33,8 @@ def read_audit(connection: Connection, number: int, action: str = "", subject: s
         query = query.where(audit.c.action != literal_column(f"'{SEALED}'"))
     if subject:
         query = query.where(audit.c.subject.contains(subject, autoescape=True))
+    if below is not None:
+        query = query.where(audit.c.seq < below)
     return [row_of(found) for found in connection.execute(query)][::-1]
 
 

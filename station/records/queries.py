@@ -68,11 +68,14 @@ def read_alarms(connection: Connection) -> tuple[StoredAlarm, ...]:
     return tuple(StoredAlarm(**dict[str, Any](row)) for row in rows.mappings())
 
 
-def read_alarm_log(connection: Connection, limit: int) -> tuple[AlarmEntry, ...]:
-    """Read the log of alarms, newest first."""
-    columns = (alarms_log.c.utc_ms, alarms_log.c.id, alarms_log.c.change, alarms_log.c.detail, alarms_log.c.sequence)
-    rows = connection.execute(select(*columns).order_by(alarms_log.c.row.desc()).limit(limit))
-    return tuple(AlarmEntry(*row) for row in rows)
+def read_alarm_log(connection: Connection, limit: int, below: int | None = None) -> dict[int, AlarmEntry]:
+    """Read the log of alarms by the rows' numbers, newest first; all of it, or what is below a number."""
+    table = alarms_log.c
+    query = select(table.row, table.utc_ms, table.id, table.change, table.detail, table.sequence)
+    if below is not None:
+        query = query.where(table.row < below)
+    rows = connection.execute(query.order_by(table.row.desc()).limit(limit))
+    return {number: AlarmEntry(*entry) for number, *entry in rows}
 
 
 def read_inspection(connection: Connection, sequence: int, folder: Path) -> FullRecord:

@@ -138,7 +138,7 @@ def _journal() -> str:
 
 def _alarms(folder: Path) -> str:
     with reading(folder) as connection:
-        active, log = read_alarms(connection), read_alarm_log(connection, _ALARMS)
+        active, log = read_alarms(connection), read_alarm_log(connection, _ALARMS).values()
     return json.dumps({"active": list(map(str, active)), "log": list(map(str, log))}, indent=1)
 
 

@@ -1,7 +1,9 @@
 """What happened is read by the pages' own process: also while the station is away."""
 
 import asyncio
+import html
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -11,7 +13,7 @@ from hmi.web.roles import Role
 from station.inspection.alarm_table import ALARMS, AlarmId
 from station.recipe_store.history import Person, submit
 from station.recipe_store.store import RecipeStore
-from station.records.audit import AuditEntry
+from station.records.audit import AuditEntry, append_audit
 from station.records.direct_transaction import direct_transaction
 from station.records.lots import start_lot
 from station.records.model import AlarmEntry, InspectionRecord, RecipeSnapshot, Trigger
@@ -79,9 +81,9 @@ def test_a_lots_report_made_at_the_pages_names_its_station_also_while_its_file_i
         assert job.state == "done", job.message
         return (folder / "lot.html").read_text(encoding="utf-8")
 
-    html = asyncio.run(reported())
-    assert "A-17" in html
-    assert "line-7" in html
+    report = asyncio.run(reported())
+    assert "A-17" in report
+    assert "line-7" in report
 
 
 def test_a_draft_that_this_program_refuses_is_shown_so_that_it_can_be_rejected(pages, tmp_path):
@@ -137,6 +139,31 @@ def test_changes_of_alarms_are_there_while_the_station_is_away(pages, tmp_path):
         status, _, body = pages("GET", "/alarms/history")
         assert (status, b"USB" in body, b"of_another_version" in body) == (200, True, True)
         assert f"<b>{ALARMS[AlarmId.CAMERA_LOST].number}</b>".encode() in body
+
+
+def test_the_audit_trail_and_the_history_of_alarms_continue_on_older_pages(pages, tmp_path):
+    async def fill() -> None:
+        records = await Records.open(tmp_path / "records", RecordsSettings(deadline_s=20.0, free_reserve_mb=1), "boot")
+        try:
+            entries = [AuditEntry(f"Ida {n:03}", "operator", "lot.told", f"lot A-{n}") for n in range(1, 102)]
+            await records.change(lambda connection: [append_audit(connection, entry) for entry in entries])
+            await records.audit(AuditEntry("Bo", "operator", "lot.told", "lot B"))
+            await records.save_alarms(
+                [], [AlarmEntry(n, "camera_lost", "raised", f"USB {n:03}") for n in range(1, 102)]
+            )
+        finally:
+            await records.close()
+
+    asyncio.run(fill())
+    with pages.context.past:
+        log_in(pages, "Ana", Role.ADMIN)
+        for path, terms, name in (("/history/audit", "?action=lot.&subject=A-", "Ida"), ("/alarms/history", "", "USB")):
+            first = pages("GET", path + terms)[2].decode()
+            assert sorted(set(re.findall(rf"{name} (\d+)", first))) == [f"{n:03}" for n in range(2, 102)]
+            (older,) = re.findall(r'href="(\?[^"]*below=\d+)"', first)
+            last = pages("GET", path + html.unescape(older))[2].decode()
+            assert set(re.findall(rf"{name} (\d+)", last)) == {"001"}
+            assert "below=" not in last
 
 
 def test_a_fruit_that_was_never_judged_has_a_page_too(pages, tmp_path):
