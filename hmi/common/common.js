@@ -88,7 +88,8 @@
         }
         pauseMs = everyMs;
         await shown(part);
-        if (headers.get("x-over")) {
+        // Only when it is shown: what a finger has kept out of the part is asked for again.
+        if (filled === html && headers.get("x-over")) {
           part.dataset.over = "";
           break;
         }

@@ -185,3 +185,24 @@ def test_a_job_that_is_done_cannot_be_cancelled(orchard: Any, panel: Any) -> Non
     follow(page.get_by_role("button", name="Printable report"))
     expect(page.get_by_role("link", name="Open lot.html")).to_be_visible()
     expect(page.get_by_role("button", name="Cancel")).to_be_hidden()
+
+
+def test_a_finger_on_the_page_at_a_jobs_end_does_not_keep_the_end_from_being_shown(orchard: Any, panel: Any) -> None:
+    def in_progress(route: Any) -> None:
+        route.fulfill(content_type="text/html", body='<p class="lead">In progress</p>')
+
+    page = panel("Quin").go("/history")
+    page.route("**/jobs/*/part**", in_progress)
+    page.get_by_text("Tables and reports").click()
+    follow(page.get_by_role("button", name="Printable report"))
+    part = page.locator("[data-poll]")
+    part.hover()
+    page.mouse.down()
+    page.unroute("**/jobs/*/part**")
+    for _ in range(2):  # the page asks for the second one when it has taken the first
+        with page.expect_response(lambda answer: answer.headers.get("x-over") == "1"):
+            pass
+    expect(part).to_contain_text("In progress")
+    page.mouse.up()
+    expect(part).to_contain_text("Done")
+    expect(page.get_by_role("button", name="Cancel")).to_be_hidden()
