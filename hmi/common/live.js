@@ -13,6 +13,7 @@
   let clockOffset = null;
   const coming = new Map();
   let pressed = null;
+  let pressedAt = 0;
   let loggedOut = false;
 
   const age = () => (ageThen < 0 ? Infinity : ageThen + performance.now() - heardAt);
@@ -56,10 +57,12 @@
   }
 
   // A part with a finger on it stays as it is until that is lifted: what is touched must not be another thing by then.
+  // Two seconds at most, twice what has to be held: a wet glove that lies there must not keep old values shown as live.
   function renew() {
+    const keeps = performance.now() - pressedAt <= STALE_MS;
     for (const [name, [digest, html]] of coming) {
       const part = parts.get(name);
-      if (part && part === pressed) {
+      if (part && part === pressed && keeps) {
         continue;
       }
       coming.delete(name);
@@ -80,8 +83,13 @@
     part.dispatchEvent(new CustomEvent("renewed", { bubbles: true }));
   }
 
+  // A key that is held, and a second finger, begin no new time.
   const press = (event) => {
-    pressed = event.target instanceof Element ? event.target.closest("[data-live], [data-poll]") : null;
+    const part = event.target instanceof Element ? event.target.closest("[data-live], [data-poll]") : null;
+    if (part !== pressed) {
+      pressed = part;
+      pressedAt = performance.now();
+    }
   };
   const lift = () =>
     setTimeout(() => {

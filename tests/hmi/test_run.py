@@ -145,6 +145,19 @@ def test_a_button_that_has_the_focus_keeps_it_when_a_fruit_comes(ready, operator
 
 
 @pytest.mark.timeout(240)
+def test_what_lies_on_the_screen_keeps_no_old_fruit_shown(ready, panel):
+    earlier = ready.end(ready.begin())
+    viewer = panel()
+    viewer.open("/")
+    viewer.page.locator(f".run-fruit .fruit-more[href='/fruit/{earlier.sequence}']").wait_for()
+    viewer.page.locator(".run-fruit .outcome").hover()
+    viewer.page.mouse.down()
+    later = ready.end(ready.begin())
+    viewer.page.locator(f".run-fruit .fruit-more[href='/fruit/{later.sequence}']").wait_for(timeout=20_000)
+    viewer.page.mouse.up()
+
+
+@pytest.mark.timeout(240)
 def test_what_stops_has_to_be_held_and_works_by_keyboard(ready, operator, eventually):
     operator.open("/")
     stop = operator.page.get_by_role("button", name="Stop")
