@@ -11,6 +11,7 @@ from fastapi import APIRouter, Depends, Form, Path, Request
 from starlette.responses import Response
 
 from hmi.common.charts import deciding_limit
+from hmi.common.commands import shown_command
 from hmi.run import charts
 from hmi.web.access import HmiNow, LocaleNow, orders
 from hmi.web.gateway import Gateway, actor_of
@@ -41,7 +42,6 @@ MOST_RECENT = 10
 _TAKT_OF = 20
 """So many fruit's intervals, of which the median is no pause of the line."""
 ORDER_DEADLINE_S = 5.0
-_FAILED_SHOWN_MS = 60_000
 _MOST_REASONS = 3
 _LEAST_INTERVALS = 3
 _ORDERS = frozenset(
@@ -54,17 +54,13 @@ _ORDERS = frozenset(
         OperatorCommandName.END_LOT,
     }
 )
+"""Given on this page; all that are given on any page are shown."""
 _IMMUTABLE = "private, max-age=31536000, immutable"
 Sequence = Annotated[int, Path(ge=1, lt=2**32)]
 
 
 def _shown_order(state: PanelState) -> OperatorCommandView | None:
-    """Return the last order while it is in progress, and one that failed for a minute: by then it has been read."""
-    order = next((each for each in state.orders if each.order in _ORDERS), None)
-    if order is None or order.state == "done":
-        return None
-    is_old = order.ended_utc_ms is not None and state.utc_ms - order.ended_utc_ms > _FAILED_SHOWN_MS
-    return None if is_old else order
+    return shown_command(state.orders, state.utc_ms)
 
 
 def _activity_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:

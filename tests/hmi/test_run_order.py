@@ -1,4 +1,4 @@
-"""The order that the run page shows: one in progress, and for a minute one that failed, with who gave it."""
+"""The order that the run page shows, whichever page gave it: one in progress, and for a minute one that failed."""
 
 import re
 
@@ -12,33 +12,54 @@ from station.messages.message import verbatim
 BEGAN_MS, ENDED_MS = 1_790_000_000_000, 1_790_000_001_000
 
 
-def state(order_state, utc_ms):
+def command(order_state, order=OperatorCommandName.START, ticket=1):
     failed = order_state == "failed"
-    order = OperatorCommandView(
-        ticket=1, order=OperatorCommandName.START, argument="", state=order_state, who="Ana", began_utc_ms=BEGAN_MS,
+    return OperatorCommandView(
+        ticket=ticket, order=order, argument="", state=order_state, who="Ana", began_utc_ms=BEGAN_MS,
         why=commands.ENDING() if failed else None, ended_utc_ms=None if order_state == "executing" else ENDED_MS,
     )  # fmt: skip
+
+
+def state(utc_ms, *orders):
     return PanelState.model_construct(  # pyrefly: ignore[missing-argument] (what the page reads)
         boot="1", utc_ms=utc_ms, state="idle", activity=verbatim(""), packml_state=None, mode=1, ready=True,
         why_not_ready=None, busy=False, needs_person=False, stopping=False, simulated=False, recipe=None, lot=None,
-        named_lot="", plc_names_lots=False, alarms=(), devices=(), orders=(order,), may=(), recoveries=(),
+        named_lot="", plc_names_lots=False, alarms=(), devices=(), orders=orders, may=(), recoveries=(),
         running_sequence=None, last_sequence=None, lot_counts=Counts(),
     )  # fmt: skip
 
 
+def shown(pages):
+    lines = re.findall('class="order-line" role="status">(.*?)</p>', pages("GET", "/")[2].decode())
+    return [line.lower() for line in lines]
+
+
+def line(order, words):
+    return f"{Locale('en').text(f'order.{order}')}: {words} <small>Ana, {Locale('en').clock(BEGAN_MS)}</small>".lower()
+
+
+@pytest.mark.parametrize("order", OperatorCommandName)
 @pytest.mark.parametrize(
     ("order_state", "after_ms", "words"),
     [
-        ("executing", 3_600_000, "Start: in progress."),
-        ("failed", 60_000, "Start: not done. the station is ending"),
+        ("executing", 3_600_000, "in progress."),
+        ("failed", 60_000, "not done. the station is ending"),
         ("failed", 60_001, ""),
         ("done", 0, ""),
     ],
 )
-def test_an_order_is_shown_in_progress_and_a_minute_after_it_failed(pages, order_state, after_ms, words):
-    pages.context.gateway.state = state(order_state, ENDED_MS)
+def test_an_order_is_shown_in_progress_and_a_minute_after_it_failed(pages, order, order_state, after_ms, words):
+    given = command(order_state, order)
+    pages.context.gateway.state = state(ENDED_MS, given)
     pages("GET", "/")  # what is shown has to follow the time alone
-    pages.context.gateway.state = state(order_state, ENDED_MS + after_ms)
-    lines = re.findall('class="order-line" role="status">(.*?)</p>', pages("GET", "/")[2].decode())
-    by = f" <small>Ana, {Locale('en').clock(BEGAN_MS)}</small>"
-    assert [line.lower() for line in lines] == ([f"{words}{by}".lower()] if words else [])
+    pages.context.gateway.state = state(ENDED_MS + after_ms, given)
+    assert shown(pages) == ([line(order, words)] if words else [])
+
+
+def test_a_change_of_fruit_in_progress_is_shown_until_its_end_though_a_later_order_is_done(pages):
+    later, change = command("done", ticket=2), command("executing", OperatorCommandName.CHOOSE_RECIPE)
+    pages.context.gateway.state = state(ENDED_MS, later, change)
+    assert shown(pages) == [line("choose_recipe", "in progress.")]
+    failed = command("failed", ticket=2)
+    pages.context.gateway.state = state(ENDED_MS, failed, change)
+    assert shown(pages) == [line("start", "not done. the station is ending")]
