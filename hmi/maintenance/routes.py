@@ -4,6 +4,7 @@ import asyncio
 import re
 import time
 from collections import OrderedDict
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -12,21 +13,25 @@ from fastapi import APIRouter, Depends, Form, Query, Request
 from pydantic import StringConstraints
 from starlette.responses import FileResponse, Response
 
+from hmi.common.commands import shown_command
 from hmi.maintenance.histogram import histogram
 from hmi.web.access import HmiNow, LocaleNow, may, orders
 from hmi.web.context import Hmi
-from hmi.web.gateway import actor_of
+from hmi.web.gateway import Gateway, actor_of
+from hmi.web.live import Part, of_state
 from hmi.web.navigation import Entry
 from hmi.web.page import go_to, show, show_part
 from hmi.web.problem import Problem
 from hmi.web.roles import Right
 from hmi.web.sessions import Caller
+from hmi.web.translation import Locale
 from station.channel.messages import ChannelError, RefusedError
 from station.channel.panel_live import (
     GetRecipes,
     OperatorCommand,
     OperatorCommandName,
     OperatorCommandView,
+    PanelState,
     PersonNoted,
     Recipes,
 )
@@ -65,6 +70,23 @@ _PLACE = re.compile(r"^\s*(-?\d+(?:[.,]\d+)?)\s*[; ]\s*(-?\d+(?:[.,]\d+)?)\s*$")
 Maintainer = Annotated[Caller, Depends(orders(Right.MAINTAIN))]
 Level = Literal["DEBUG", "INFO", "WARNING", "ERROR"]
 Brightness = Annotated[int, Form(ge=0, le=15)]
+
+
+def _mode_command(state: PanelState) -> OperatorCommandView | None:
+    given = [each for each in state.orders if each.order is OperatorCommandName.SET_MODE]
+    return shown_command(given, state.utc_ms)
+
+
+def _mode_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
+    state = gateway.state
+    return {"state": state, "command": None if state is None else _mode_command(state)}
+
+
+PARTS = {
+    "maintenance.mode": Part(
+        "maintenance_mode.html.j2", of_state(lambda state: (state.mode, _mode_command(state))), _mode_values
+    )
+}
 
 
 @router.get("")
@@ -117,11 +139,11 @@ async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"
     """Set manual mode, in which no fruit is accepted, or production again."""
     query = OperatorCommand(person=actor_of(caller), order=OperatorCommandName.SET_MODE, argument=mode)
     command = await hmi.gateway.request(query, OperatorCommandView, deadline_s=DEADLINE_S)
-    until_s = time.monotonic() + MODE_S
-    while command.state == "executing" and time.monotonic() < until_s:
+    ended, until_s = None, time.monotonic() + MODE_S
+    while ended is None and command.state != "failed" and time.monotonic() < until_s:
         await asyncio.sleep(0.1)
-        if (await _health(hmi))["health"].mode == int(mode):
-            break
+        ended = _ended(hmi, command.ticket)
+    command = ended or command
     if command.state == "failed":
         raise RefusedError(command.why or "")
     return go_to("/maintenance/hand")
@@ -262,6 +284,12 @@ _OLD_IMAGE_S = 2.0
 """An image is shown as live up to this age, as are all values of the pages."""
 _FRAMES: OrderedDict[str, Picture] = OrderedDict()
 """The last live images: a page gets the address of one, and then fetches it."""
+
+
+def _ended(hmi: Hmi, ticket: int) -> OperatorCommandView | None:
+    """Return a command that has ended, once the station's state of the pages, which they show, has its end."""
+    commands = () if hmi.gateway.state is None else hmi.gateway.state.orders
+    return next((each for each in commands if each.ticket == ticket and each.state != "executing"), None)
 
 
 async def _health(hmi: Hmi) -> dict[str, Any]:

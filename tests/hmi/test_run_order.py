@@ -1,11 +1,17 @@
-"""The order that the run page shows, whichever page gave it: one in progress, and for a minute one that failed."""
+"""The order that the run page shows, whichever page gave it: one in progress, and for a minute one that failed.
+
+Likewise the change of the mode on the page that gives it.
+"""
 
 import re
 
 import pytest
 
+from hmi.maintenance import routes as maintenance
+from hmi.web.roles import Role
 from hmi.web.translation import Locale
-from station.channel.panel_live import Counts, OperatorCommandName, OperatorCommandView, PanelState
+from station.channel.panel_live import Counts, OperatorCommand, OperatorCommandName, OperatorCommandView, PanelState
+from station.channel.panel_maintenance_queries import Health
 from station.messages import commands
 from station.messages.message import verbatim
 
@@ -63,3 +69,28 @@ def test_a_change_of_fruit_in_progress_is_shown_until_its_end_though_a_later_ord
     failed = command("failed", ticket=2)
     pages.context.gateway.state = state(ENDED_MS, failed, change)
     assert shown(pages) == [line("start", "not done. the station is ending")]
+
+
+@pytest.mark.parametrize("end", [None, "done", "failed"])
+def test_a_change_of_mode_says_what_became_of_it(pages, monkeypatch, end):
+    given = command("executing", OperatorCommandName.SET_MODE)
+
+    async def answer(request, *_, **__):
+        if isinstance(request, OperatorCommand):
+            pages.context.gateway.state = state(ENDED_MS, command(end or "executing", OperatorCommandName.SET_MODE))
+            return given
+        return Health.model_construct(mode=1, jog_refused=None, width_mm=40.0)  # pyrefly: ignore[missing-argument]
+
+    monkeypatch.setattr(pages.context.gateway, "request", answer)
+    monkeypatch.setattr(maintenance, "MODE_S", 0.3)
+    pages.cookies["station_session"] = pages.context.sessions.log_in("Max", Role.MAINTENANCE)
+    status, headers, body = pages.post("/maintenance/mode", csrf=pages.token(), mode="3")
+    if end == "failed":
+        assert status == 409
+        assert "the station is ending" in body.decode().lower()
+    else:
+        assert (status, headers["location"]) == (303, "/maintenance/hand")
+    page = pages("GET", "/maintenance/hand")[2].decode()
+    assert "Set manual mode" in page
+    assert ("Change the mode: in progress." in page) == (end is None)
+    assert ("Change the mode: not done. " in page) == (end == "failed")
