@@ -4,10 +4,12 @@
 (() => {
   const STALE_MS = 2000;
   const AGAIN_MS = 1000;
+  const SILENT_MS = 5000;
   const body = document.body;
   const line = document.querySelector("[data-stale]");
   const parts = new Map([...document.querySelectorAll("[data-live]")].map((part) => [part.dataset.live, part]));
   let source = null;
+  let openedAt = 0;
   let heardAt = performance.now();
   let ageThen = Number(body.dataset.ageMs);
   let clockOffset = null;
@@ -108,6 +110,7 @@
     if (source || document.hidden) {
       return;
     }
+    openedAt = performance.now();
     const query = [...parts.keys()].map((name) => `part=${encodeURIComponent(name)}`).join("&");
     source = new EventSource(`/live?${query}`);
     source.onmessage = (event) => take(JSON.parse(event.data));
@@ -123,6 +126,14 @@
     if (source) {
       source.close();
       source = null;
+    }
+  }
+
+  // After an outage beyond this machine's own cable the stream's connection looks open, and says nothing for minutes.
+  function watch() {
+    if (source && performance.now() - Math.max(heardAt, openedAt) > SILENT_MS) {
+      close();
+      open();
     }
   }
 
@@ -168,7 +179,10 @@
   document.addEventListener("visibilitychange", () => (document.hidden ? close() : open()));
   window.addEventListener("pagehide", close);
   window.addEventListener("pageshow", (event) => event.persisted && location.reload());
-  setInterval(look, 250);
+  setInterval(() => {
+    look();
+    watch();
+  }, 250);
   look();
   open();
 })();

@@ -1,11 +1,69 @@
-"""Open pages while the station or the pages' own process hangs or is killed."""
+"""Open pages while the station or the pages' own process hangs or is killed, or their stream's connection dies."""
 
+import contextlib
 import re
+import socket
+import threading
 import time
 
 import pytest
 
 from tests.chromium import follow
+
+
+class Cable:
+    """The way to the pages' port. A connection whose stream is cut stays open and carries nothing; new ones work."""
+
+    def __init__(self, port, far_port):
+        self._far_port, self._streams, self._silent = far_port, set(), set()
+        self._listener, self._sockets = socket.create_server(("127.0.0.1", port)), []
+        self._threads = []
+        self._begin(self._accept)
+
+    def _begin(self, work, *arguments):
+        self._threads.append(threading.Thread(target=work, args=arguments))
+        self._threads[-1].start()
+
+    def _accept(self):
+        with contextlib.suppress(OSError):  # closed
+            while True:
+                near, _ = self._listener.accept()
+                far = socket.create_connection(("127.0.0.1", self._far_port))
+                self._sockets += near, far
+                self._begin(self._carry, near, far)
+                self._begin(self._carry, far, near)
+
+    def _carry(self, source, target):
+        with contextlib.suppress(OSError):
+            while data := source.recv(2**16):
+                if data.startswith(b"GET /live?"):
+                    self._streams |= {source, target}
+                if source not in self._silent:
+                    target.sendall(data)
+            if source not in self._silent:
+                target.shutdown(socket.SHUT_WR)
+
+    def cut_streams(self):
+        cut = self._streams - self._silent
+        self._silent |= cut
+        return len(cut)
+
+    def close(self):
+        self._listener.shutdown(socket.SHUT_RDWR)
+        self._threads[0].join()
+        for each in self._sockets:
+            with contextlib.suppress(OSError):
+                each.shutdown(socket.SHUT_RDWR)
+        for thread in self._threads:
+            thread.join()
+        for each in (self._listener, *self._sockets):
+            each.close()
+
+
+@pytest.fixture
+def cable(cell, unused_port):
+    with contextlib.closing(Cable(unused_port, cell.configuration.hmi.port)) as made:
+        yield made
 
 
 @pytest.mark.timeout(240)
@@ -80,3 +138,15 @@ def test_the_pages_are_killed_under_a_running_line(ready, panel):
     viewer.page.locator("body:not(.stale)").wait_for()
     viewer.page.locator(f".run-fruit a.fruit-more[href$='/{sequence}']").wait_for()
     assert ready.process("hmi").pid != killed.pid
+
+
+@pytest.mark.timeout(240)
+def test_a_stream_whose_connection_went_silent_is_opened_again(ready, panel, cable, unused_port):
+    viewer = panel(f"http://127.0.0.1:{unused_port}")
+    viewer.open("/")
+    viewer.until(".station-state", "Ready")
+    page_made = viewer.page.evaluate("document.body.dataset.made = 'once'")
+    assert cable.cut_streams()
+    viewer.page.locator("body.stale").wait_for()
+    viewer.page.locator("body:not(.stale)").wait_for(timeout=10_000)
+    assert viewer.page.evaluate("document.body.dataset.made") == page_made, "it recovers without being loaded anew"
