@@ -10,6 +10,7 @@
   const parts = new Map([...document.querySelectorAll("[data-live]")].map((part) => [part.dataset.live, part]));
   let source = null;
   let openedAt = 0;
+  let broken = false;
   let heardAt = performance.now();
   let ageThen = Number(body.dataset.ageMs);
   let clockOffset = null;
@@ -29,6 +30,7 @@
       loggedOut = true;
     }
     heardAt = performance.now();
+    broken = false;
     ageThen = reply.age_ms === null ? -1 : reply.age_ms;
     if (reply.utc_ms) {
       clockOffset = reply.utc_ms + Math.max(0, ageThen) - Date.now();
@@ -115,6 +117,7 @@
     source = new EventSource(`/live?${query}`);
     source.onmessage = (event) => take(JSON.parse(event.data));
     source.onerror = () => {
+      broken = true;
       if (source && source.readyState === EventSource.CLOSED) {
         close();
         setTimeout(open, AGAIN_MS);
@@ -175,6 +178,7 @@
   }
 
   globalThis.staleness = { staleMs: STALE_MS, words: oldWords };
+  globalThis.stream = { isHeard: () => !broken && performance.now() - heardAt <= STALE_MS };
   globalThis.renewal = { fill, isPressed: (part) => part === pressed };
   document.addEventListener("visibilitychange", () => (document.hidden ? close() : open()));
   window.addEventListener("pagehide", close);

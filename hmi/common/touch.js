@@ -5,6 +5,8 @@
   const HOLD_MS = 1000;
   const AGAIN_MS = 5000;
   const HERE_MS = 5000;
+  const REACH_MS = 2000;
+  const reached = new WeakSet();
   let toldHere = 0;
 
   // An order is sent once, however often the button is pressed.
@@ -18,11 +20,29 @@
       return;
     }
     form.dataset.sent = "yes";
+    form.setAttribute("aria-busy", "true");
+    if (!reached.delete(form) && !stream.isHeard()) {
+      event.preventDefault();
+      sendIfReached(form, event.submitter);
+      return;
+    }
     if (form.csrf && !form.csrf.value) {
       form.csrf.value = document.body.dataset.token;
     }
-    form.setAttribute("aria-busy", "true");
   });
+
+  // Sent while the pages' process is away, an order would leave the browser's own error page, from which a panel has no
+  // way back. Where no answer comes at once the page stays and says how old it is; the button can be pressed again.
+  async function sendIfReached(form, submitter) {
+    const asked = fetch("/here", { method: "POST", signal: AbortSignal.timeout(REACH_MS) });
+    const isReached = await asked.then((answer) => answer.ok).catch(() => false);
+    delete form.dataset.sent;
+    form.removeAttribute("aria-busy");
+    if (isReached) {
+      reached.add(form);
+      form.requestSubmit(submitter);
+    }
+  }
 
   // Held for a second, by finger, mouse or key. A screen reader, which can only click, presses twice.
   function holdable(button) {
@@ -30,9 +50,10 @@
     let held = false;
     let label = "";
     const begin = () => {
-      if (timer || held) {
+      if (timer || button.form.dataset.sent) {
         return;
       }
+      held = false;
       button.classList.add("holding");
       timer = setTimeout(() => {
         held = true;
@@ -53,7 +74,9 @@
     button.addEventListener("keydown", (event) => {
       if (event.key === "Enter" || event.key === " ") {
         event.preventDefault();
-        begin();
+        if (!event.repeat) {
+          begin();
+        }
       }
     });
     button.addEventListener("keyup", end);

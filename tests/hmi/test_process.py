@@ -60,12 +60,6 @@ class Cable:
             each.close()
 
 
-@pytest.fixture
-def cable(cell, unused_port):
-    with contextlib.closing(Cable(unused_port, cell.configuration.hmi.port)) as made:
-        yield made
-
-
 @pytest.mark.timeout(240)
 def test_the_station_hangs_and_is_killed_under_an_open_page(ready, panel):
     viewer = panel()
@@ -141,12 +135,43 @@ def test_the_pages_are_killed_under_a_running_line(ready, panel):
 
 
 @pytest.mark.timeout(240)
-def test_a_stream_whose_connection_went_silent_is_opened_again(ready, panel, cable, unused_port):
-    viewer = panel(f"http://127.0.0.1:{unused_port}")
-    viewer.open("/")
-    viewer.until(".station-state", "Ready")
-    page_made = viewer.page.evaluate("document.body.dataset.made = 'once'")
-    assert cable.cut_streams()
-    viewer.page.locator("body.stale").wait_for()
-    viewer.page.locator("body:not(.stale)").wait_for(timeout=10_000)
-    assert viewer.page.evaluate("document.body.dataset.made") == page_made, "it recovers without being loaded anew"
+def test_a_stream_whose_connection_went_silent_is_opened_again(ready, panel, unused_port):
+    with contextlib.closing(Cable(unused_port, ready.configuration.hmi.port)) as cable:
+        viewer = panel(f"http://127.0.0.1:{unused_port}")
+        viewer.open("/")
+        viewer.until(".station-state", "Ready")
+        page_made = viewer.page.evaluate("document.body.dataset.made = 'once'")
+        assert cable.cut_streams()
+        viewer.page.locator("body.stale").wait_for()
+        viewer.page.locator("body:not(.stale)").wait_for(timeout=10_000)
+        assert viewer.page.evaluate("document.body.dataset.made") == page_made, "it recovers without being loaded anew"
+
+
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize("hangs", [False, True])
+def test_an_order_given_while_the_pages_are_away_keeps_the_page_and_works_once_they_are_back(
+    ready, people, panel, unused_port, hangs
+):
+    person = panel(f"http://127.0.0.1:{unused_port}")
+    button = person.page.get_by_role("button", name="Change to Raspberry")
+    with contextlib.closing(Cable(unused_port, ready.configuration.hmi.port)):
+        person.log_in("Ana", "7391")
+        person.open("/change/3")
+        person.until(".station-state", "Ready")
+    with contextlib.closing(socket.socket()) as nobody:
+        nobody.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        nobody.bind(("127.0.0.1", unused_port))
+        if hangs:
+            nobody.listen()
+        person.page.locator("body.stale").wait_for()
+        button.click()
+        person.page.wait_for_timeout(4000)  # twice as long as the page waits for an answer
+        assert person.page.url.endswith("/change/3")
+        assert re.search(r"No data for \d+ s", person.text(".stale-line"))
+        assert person.page.locator("form[data-sent]").count() == 0
+    with contextlib.closing(Cable(unused_port, ready.configuration.hmi.port)):
+        person.page.locator("body:not(.stale)").wait_for()
+        assert ready.until(lambda _: True).recipe.number != 3, "what was not sent is not carried out later"
+        follow(button)
+        person.until("main", "The station is ready")
+        assert ready.until(lambda _: True).recipe.number == 3
