@@ -1,6 +1,7 @@
 """The pages as pictures for the documents."""
 
 import io
+import re
 from pathlib import Path
 
 import psutil
@@ -71,7 +72,7 @@ def draw(address: str, process: psutil.Process, browser: Browser, console: int) 
     page.locator("[role=search] [name=lot]").click()
     settled(page)
     keep(page, "keyboard")
-    page.context.clear_cookies(name="station_panel")
+    page.context.clear_cookies(name=re.compile("^station_panel"))
     page.goto(f"{address}/change")
     page.locator(".fruit-tile:not(.active)").first.click()
     kept_in_all_sizes(page, "confirm")

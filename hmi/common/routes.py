@@ -14,7 +14,9 @@ from hmi.web.access import (
     LocaleNow,
     address_of,
     caller_of,
+    cookie_name,
 )
+from hmi.web.context import Hmi
 from hmi.web.gateway import Gateway
 from hmi.web.live import Part, of_state
 from hmi.web.page import go_to, is_ours
@@ -62,9 +64,7 @@ async def live(
 async def panel(hmi: HmiNow) -> Response:
     """Begin at a panel without a keyboard: this browser gets one on the screen. A panel's browser opens this page."""
     answer = go_to("/")
-    answer.set_cookie(
-        PANEL_COOKIE, "1", max_age=_A_YEAR_S, secure=hmi.settings.tls.enabled, httponly=True, samesite="strict"
-    )
+    _set_cookie(answer, hmi, PANEL_COOKIE, "1")
     return answer
 
 
@@ -86,7 +86,10 @@ async def language(
     if language not in hmi.settings.languages:
         raise Problem(400, "problem.bad_form")
     answer = go_to(back if is_ours(back) else "/")
-    answer.set_cookie(
-        LANGUAGE_COOKIE, language, max_age=_A_YEAR_S, secure=hmi.settings.tls.enabled, httponly=True, samesite="strict"
-    )
+    _set_cookie(answer, hmi, LANGUAGE_COOKIE, language)
     return answer
+
+
+def _set_cookie(answer: Response, hmi: Hmi, cookie: str, value: str) -> None:
+    name, secure = cookie_name(hmi, cookie), hmi.settings.tls.enabled
+    answer.set_cookie(name, value, max_age=_A_YEAR_S, secure=secure, httponly=True, samesite="strict")

@@ -11,7 +11,7 @@ from hmi.web.roles import Right, Role, least_role
 from hmi.web.sessions import Caller
 from hmi.web.translation import Locale, preferred
 
-SESSION_COOKIE, LANGUAGE_COOKIE, PANEL_COOKIE = "station_session", "station_language", "station_panel"
+SESSION_COOKIE, LANGUAGE_COOKIE, PANEL_COOKIE = "session", "language", "panel"
 TOKEN_FIELD, TOKEN_HEADER = "csrf", "x-csrf-token"
 
 
@@ -20,9 +20,14 @@ def hmi_of(request: Request) -> Hmi:
     return request.app.state.hmi
 
 
+def cookie_name(hmi: Hmi, cookie: str) -> str:
+    """Return a cookie's name, with our port: a browser sends a machine's cookies to the other stations there too."""
+    return f"station_{cookie}_{hmi.settings.port}"
+
+
 def caller_of(request: Request) -> Caller:
     """Return the caller; a viewer if nobody is logged in. A browser without a cookie gets one with the page."""
-    session = request.cookies.get(SESSION_COOKIE, "")
+    session = request.cookies.get(cookie_name(hmi_of(request), SESSION_COOKIE), "")
     if not session:
         session = getattr(request.state, "new_session", "") or hmi_of(request).sessions.new()
         request.state.new_session = session
@@ -31,13 +36,14 @@ def caller_of(request: Request) -> Caller:
 
 def at_panel(request: Request) -> bool:
     """Return whether the browser is a panel's: it has no keyboard, and saves and prints nothing."""
-    return PANEL_COOKIE in request.cookies
+    return cookie_name(hmi_of(request), PANEL_COOKIE) in request.cookies
 
 
 def locale_of(request: Request) -> Locale:
     """Return the language to answer in."""
-    cookie, accepted = request.cookies.get(LANGUAGE_COOKIE, ""), request.headers.get("accept-language", "")
-    return Locale(preferred(hmi_of(request).settings.languages, cookie, accepted))
+    hmi, accepted = hmi_of(request), request.headers.get("accept-language", "")
+    chosen = request.cookies.get(cookie_name(hmi, LANGUAGE_COOKIE), "")
+    return Locale(preferred(hmi.settings.languages, chosen, accepted))
 
 
 def address_of(request: Request) -> str:

@@ -8,7 +8,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from markupsafe import Markup
 from starlette.responses import Response
 
-from hmi.web.access import SESSION_COOKIE, at_panel, caller_of, hmi_of, locale_of
+from hmi.web.access import SESSION_COOKIE, at_panel, caller_of, cookie_name, hmi_of, locale_of
 from hmi.web.context import Hmi
 from hmi.web.navigation import entries
 from hmi.web.roles import Right, Role
@@ -58,10 +58,11 @@ def show_part(
 def give_session(request: Request, answer: Response, session: str) -> None:
     """Set the browser's cookie if it is new."""
     if session:
-        secure = hmi_of(request).settings.tls.enabled
+        hmi = hmi_of(request)
+        name, secure = cookie_name(hmi, SESSION_COOKIE), hmi.settings.tls.enabled
         # With "strict" a link from another site comes without the cookie, and a new one would log the person out.
         # No order depends on it: each is a POST from our own page with a token.
-        answer.set_cookie(SESSION_COOKIE, session, secure=secure, httponly=True, samesite="lax", path="/")
+        answer.set_cookie(name, session, secure=secure, httponly=True, samesite="lax", path="/")
 
 
 def go_to(address: str) -> RedirectResponse:

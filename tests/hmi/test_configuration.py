@@ -71,7 +71,7 @@ def test_the_file_is_edited_with_its_comments_and_taken_back(pages, file, noted)
     ],
 )
 def test_every_mistake_is_shown_at_its_line_and_nothing_is_saved(pages, file, noted, language, words):
-    pages.cookies["station_language"] = language
+    pages.cookies["station_language_8080"] = language
     wrong = TEXT.replace("7", "seven") + "gripperr: {}\n"
     status, body = save(pages, wrong)
     assert status == 400

@@ -83,7 +83,7 @@ def test_a_change_of_mode_says_what_became_of_it(pages, monkeypatch, end):
 
     monkeypatch.setattr(pages.context.gateway, "request", answer)
     monkeypatch.setattr(maintenance, "MODE_S", 0.3)
-    pages.cookies["station_session"] = pages.context.sessions.log_in("Max", Role.MAINTENANCE)
+    pages.cookies["station_session_8080"] = pages.context.sessions.log_in("Max", Role.MAINTENANCE)
     status, headers, body = pages.post("/maintenance/mode", csrf=pages.token(), mode="3")
     if end == "failed":
         assert status == 409

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hmi.web.app import make_app, make_context
 from hmi.web.gateway import UNNAMED_BURST, UNNAMED_REFILL_S, Gateway
 from hmi.web.login_limiter import FREE_TRIES, LONGEST_WAIT_S, LoginRateLimiter
 from hmi.web.navigation import modules
@@ -18,6 +19,8 @@ from hmi.web.roles import RIGHTS, Right, Role, least_role
 from hmi.web.security import LARGEST_BODY_BYTES, SAFE_METHODS
 from hmi.web.sessions import TOKEN_LIFE_S, Sessions
 from hmi.web.user_store import FILE_NAME, UserStore, UserStoreError, pin_problem
+from station.settings.configuration import load_configuration
+from tests.hmi.conftest import Pages
 
 PIN, OTHER_PIN = "482915", "730264"
 
@@ -32,7 +35,7 @@ class Clock:
 
 def log_in(pages, name="admin", role=Role.ADMIN):
     session = pages.context.sessions.log_in(name, role)
-    pages.cookies["station_session"] = session
+    pages.cookies["station_session_8080"] = session
     return session
 
 
@@ -108,7 +111,7 @@ class TestRequests:
         token = pages.token()
         assert pages.post("/language", csrf=token, language="de")[0] == 303
         assert pages.post("/language", csrf=token, language="es")[0] == 409
-        assert pages.cookies["station_language"] == "de"
+        assert pages.cookies["station_language_8080"] == "de"
 
     def test_another_browsers_token_is_worth_nothing(self, pages):
         token = pages.token()
@@ -183,9 +186,9 @@ class TestLogIn:
         assert (wrong[0], pages.context.people.first_start) == (400, True)
         simple = pages.post("/people/begin", csrf=pages.token(), name="admin", pin="123456", again="123456")
         assert (simple[0], pages.context.people.first_start) == (400, True)
-        before = pages.cookies["station_session"]
+        before = pages.cookies["station_session_8080"]
         assert pages.post("/people/begin", csrf=pages.token(), name="admin", pin=PIN, again=PIN)[0] == 303
-        assert pages.cookies["station_session"] != before, "a cookie from before the log-in is worth nothing"
+        assert pages.cookies["station_session_8080"] != before, "a cookie from before the log-in is worth nothing"
         again = pages.post("/people/begin", csrf=pages.token(), name="eve", pin=OTHER_PIN, again=OTHER_PIN)
         assert again[0] == 400
         assert list(pages.context.people.names()) == ["admin"]
@@ -249,6 +252,22 @@ class TestLogIn:
         assert pages.post(path, csrf=pages.token(), **fields)[0] == 403
         assert noted == [("log_in_refused", "admin", "127.0.0.1")]
 
+    def test_two_stations_on_one_machine_log_nobody_out_of_the_other(self, pages, tmp_path):
+        """A browser's cookies are a host's, whatever the port."""
+        home = tmp_path / "second"
+        home.mkdir()
+        site = load_configuration(None, {"STATION_HOME": str(home), "STATION_HMI_PORT": "8081"})
+        context = make_context(site, None, "")
+        second = Pages(make_app(context), context, pages.cookies)
+        for each in (pages, second):
+            each.context.people.begin("admin", PIN)
+            assert each.post("/people/log-in", csrf=each.token(), name="admin", pin=PIN)[0] == 303
+        for each in (pages, second):
+            assert each.post("/people/put", csrf=each.token(), name="Ana", role="operator", pin="7391")[0] == 303
+            assert each.post("/language", csrf=each.token(), language="de")[0] == 303
+        assert second.post("/language", csrf=second.token(), language="es")[0] == 303
+        assert [b'<html lang="de"' in each("GET", "/")[2] for each in (pages, second)] == [True, False]
+
     def test_wrong_pins_have_to_wait(self, pages):
         pages.context.people.begin("admin", PIN)
         for _ in range(FREE_TRIES + 1):
@@ -256,7 +275,7 @@ class TestLogIn:
         status, _, body = pages.post("/people/log-in", csrf=pages.token(), name="admin", pin=PIN)
         assert status == 429
         assert b"Too many wrong PINs" in body
-        assert pages.context.sessions.caller(pages.cookies["station_session"]).role is Role.VIEWER
+        assert pages.context.sessions.caller(pages.cookies["station_session_8080"]).role is Role.VIEWER
 
     def test_a_cookie_is_out_of_reach_of_scripts_and_other_pages(self, pages):
         pages.context.people.begin("admin", PIN)
@@ -334,7 +353,7 @@ class TestLogIn:
         assert sessions.caller(other).name == "Ana", "a wrong PIN ends nobody's session"
         assert pages.post("/people/own-pin", csrf=pages.token(), old="7391", pin="8402")[0] == 303
         assert {sessions.caller(session).role for session in (other, own)} == {Role.VIEWER}
-        here = pages.cookies["station_session"]
+        here = pages.cookies["station_session_8080"]
         assert sessions.caller(here).name == "Ana", "who has changed it stays logged in here"
         log_in(pages)
         assert pages.post("/people/put", csrf=pages.token(), name="Ana", role="quality", pin=OTHER_PIN)[0] == 303
@@ -347,7 +366,7 @@ class TestLogIn:
         log_in(pages, "Bea", Role.ADMIN)
         assert pages.post("/people/put", csrf=pages.token(), name="Bea", role="operator", pin="7391")[0] == 303
         assert pages.post("/people/put", csrf=pages.token(), name="Eve", role="admin", pin=PIN)[0] == 403
-        assert pages.context.sessions.caller(pages.cookies["station_session"]).role is Role.OPERATOR
+        assert pages.context.sessions.caller(pages.cookies["station_session_8080"]).role is Role.OPERATOR
         assert pages.context.sessions.caller(elsewhere).role is Role.VIEWER
 
     def test_audit_rows_of_anybody_are_limited_and_those_left_out_are_counted(self, pages, monkeypatch):

@@ -27,11 +27,13 @@ def test_a_person_is_logged_in_over_tls_with_a_cookie_for_nothing_else(people, p
     with browser.page.expect_navigation():
         follow(browser.page.locator("button[name=language][value=es]"))
     cookies = {each["name"]: each for each in browser.context.cookies()}
-    assert {"station_session", "station_language"} <= set(cookies)
+    port = address.rpartition(":")[2]
+    session, language = f"station_session_{port}", f"station_language_{port}"
+    assert {session, language} <= set(cookies)
     for name, cookie in cookies.items():
-        site = "Lax" if name == "station_session" else "Strict"
+        site = "Lax" if name == session else "Strict"
         assert (cookie["secure"], cookie["httpOnly"], cookie["sameSite"]) == (True, True, site), name
-    plain = http.client.HTTPConnection("127.0.0.1", int(address.rpartition(":")[2]), timeout=60)
+    plain = http.client.HTTPConnection("127.0.0.1", int(port), timeout=60)
     plain.request("GET", "/")
     with pytest.raises((http.client.HTTPException, ConnectionError)):
         plain.getresponse()
