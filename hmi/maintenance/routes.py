@@ -7,7 +7,7 @@ from collections import OrderedDict
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from fastapi import APIRouter, Depends, Form, Query, Request
 from pydantic import StringConstraints
@@ -70,6 +70,8 @@ _PLACE = re.compile(r"^\s*(-?\d+(?:[.,]\d+)?)\s*[; ]\s*(-?\d+(?:[.,]\d+)?)\s*$")
 Maintainer = Annotated[Caller, Depends(orders(Right.MAINTAIN))]
 Level = Literal["DEBUG", "INFO", "WARNING", "ERROR"]
 Brightness = Annotated[int, Form(ge=0, le=15)]
+ModeTab = Literal["hand", "sensor"]
+"""Tabs with the mode's button."""
 
 
 def _mode_command(state: PanelState) -> OperatorCommandView | None:
@@ -77,16 +79,17 @@ def _mode_command(state: PanelState) -> OperatorCommandView | None:
     return shown_command(given, state.utc_ms)
 
 
-def _mode_values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
-    state = gateway.state
-    return {"state": state, "command": None if state is None else _mode_command(state)}
+def _mode_part(tab: str) -> Part:
+    """Make the mode's button and what became of it, for a tab to which the button comes back."""
+
+    def values(gateway: Gateway, _: Locale) -> Mapping[str, Any]:
+        state = gateway.state
+        return {"tab": tab, "state": state, "command": None if state is None else _mode_command(state)}
+
+    return Part("maintenance_mode.html.j2", of_state(lambda state: (state.mode, _mode_command(state))), values)
 
 
-PARTS = {
-    "maintenance.mode": Part(
-        "maintenance_mode.html.j2", of_state(lambda state: (state.mode, _mode_command(state))), _mode_values
-    )
-}
+PARTS = {f"maintenance.mode_{tab}": _mode_part(tab) for tab in get_args(ModeTab)}
 
 
 @router.get("")
@@ -135,7 +138,12 @@ async def hand_part(hmi: HmiNow, locale: LocaleNow) -> Response:
 
 
 @router.post("/mode")
-async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"], Form()]) -> Response:
+async def mode(
+    hmi: HmiNow,
+    caller: Maintainer,
+    mode: Annotated[Literal["1", "3"], Form()],
+    tab: Annotated[ModeTab, Form()] = "hand",
+) -> Response:
     """Set manual mode, in which no fruit is accepted, or production again."""
     query = OperatorCommand(person=actor_of(caller), order=OperatorCommandName.SET_MODE, argument=mode)
     command = await hmi.gateway.request(query, OperatorCommandView, deadline_s=DEADLINE_S)
@@ -146,7 +154,7 @@ async def mode(hmi: HmiNow, caller: Maintainer, mode: Annotated[Literal["1", "3"
     command = ended or command
     if command.state == "failed":
         raise RefusedError(command.why or "")
-    return go_to("/maintenance/hand")
+    return go_to(f"/maintenance/{tab}")
 
 
 @router.post("/jog")

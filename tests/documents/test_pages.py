@@ -8,6 +8,7 @@ import pytest
 from markdown_it import MarkdownIt
 
 from hmi.recipes.form import field_texts
+from hmi.web.folders import HMI
 from hmi.web.text import texts
 from hmi.web.translation import Locale, page_renderer
 from station.settings.hmi import LANGUAGES
@@ -15,6 +16,9 @@ from tests.chromium import ARGUMENTS
 
 STYLE = Path(__file__).with_name("print.css")
 PAGE = re.compile(rb"/Type\s*/Page\b")
+ITALIC = re.compile(r"(?<!\*)\*([^*]+)\*(?!\*)")
+TAB_OF_THE_BALL = ("layout", "sensor", "mode")
+"""Its templates."""
 OPERATORS_GUIDES = {
     language: "operator.md" if language == "en" else f"operator.{language}.md" for language in LANGUAGES
 }
@@ -57,7 +61,19 @@ def test_what_the_operators_guide_calls_a_button_is_written_on_the_panel(pages, 
     words |= {Locale(language).own(key, title) for key, (title, _) in field_texts().items()}
     beginnings = {text.partition("{")[0] for text in words if "{" in text}
     guide = pages[f"docs/{OPERATORS_GUIDES[language]}"].path.read_text("utf-8")
-    named = set(re.findall(r"(?<!\*)\*([^*]+)\*(?!\*)", guide))
+    named = set(ITALIC.findall(guide))
     assert len(named) > 25
     unknown = {each for each in named if each.rstrip("…") not in beginnings and not {each, each + "."} & words}
     assert unknown == set()
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_the_ball_needs_no_button_of_another_tab(pages, language):
+    guide = pages[f"docs/{OPERATORS_GUIDES[language]}"].path.read_text("utf-8")
+    (ball,) = [part for part in guide.split("\n## ") if "*Sensor*" in part]
+    named, written = set(ITALIC.findall(ball)), page_renderer(language)
+    own = {key for key, each in texts().items() if key.startswith("maintenance.") and written.form(each, 1) in named}
+    own = {key for key in own if not key.startswith("maintenance.run_is_")}
+    assert len(own) >= 4
+    tab = "".join((HMI / "maintenance" / f"maintenance_{each}.html.j2").read_text("utf-8") for each in TAB_OF_THE_BALL)
+    assert {key for key in own if f't("{key}")' not in tab} == set()

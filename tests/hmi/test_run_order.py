@@ -71,8 +71,9 @@ def test_a_change_of_fruit_in_progress_is_shown_until_its_end_though_a_later_ord
     assert shown(pages) == [line("start", "not done. the station is ending")]
 
 
+@pytest.mark.parametrize("tab", ["hand", "sensor"])
 @pytest.mark.parametrize("end", [None, "done", "failed"])
-def test_a_change_of_mode_says_what_became_of_it(pages, monkeypatch, end):
+def test_a_change_of_mode_says_what_became_of_it(pages, monkeypatch, end, tab):
     given = command("executing", OperatorCommandName.SET_MODE)
 
     async def answer(request, *_, **__):
@@ -84,12 +85,12 @@ def test_a_change_of_mode_says_what_became_of_it(pages, monkeypatch, end):
     monkeypatch.setattr(pages.context.gateway, "request", answer)
     monkeypatch.setattr(maintenance, "MODE_S", 0.3)
     pages.cookies["station_session_8080"] = pages.context.sessions.log_in("Max", Role.MAINTENANCE)
-    status, headers, body = pages.post("/maintenance/mode", csrf=pages.token(), mode="3")
+    status, headers, body = pages.post("/maintenance/mode", csrf=pages.token(), mode="3", tab=tab)
     if end == "failed":
         assert status == 409
         assert "the station is ending" in body.decode().lower()
     else:
-        assert (status, headers["location"]) == (303, "/maintenance/hand")
+        assert (status, headers["location"]) == (303, f"/maintenance/{tab}")
     page = pages("GET", "/maintenance/hand")[2].decode()
     assert "Set manual mode" in page
     assert ("Change the mode: in progress." in page) == (end is None)

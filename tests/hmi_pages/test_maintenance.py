@@ -133,6 +133,15 @@ def test_a_verification_without_a_calibration_says_what_to_do(orchard: Any, pane
         assert page.get_by_text("None yet.").count() == 2
 
 
+def test_the_mode_is_set_on_the_tab_of_the_ball_too(orchard: Any, panel: Any) -> None:
+    page = panel("Max").go("/maintenance/sensor")
+    follow(page.get_by_role("button", name="Set manual mode"))
+    expect(page.get_by_role("button", name="Calibrate")).to_be_visible()
+    follow(page.get_by_role("button", name="Back to production"))
+    expect(page.get_by_text("set manual mode, 3, first")).to_be_visible()
+    assert orchard.state().mode == 1
+
+
 def test_places_are_typed_at_a_panel_one_per_line(orchard: Any, panel: Any) -> None:
     person = panel("Max", locale="es")
     person.go("/panel")
