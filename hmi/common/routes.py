@@ -15,6 +15,7 @@ from hmi.web.access import (
     address_of,
     caller_of,
     cookie_name,
+    holder_of,
 )
 from hmi.web.context import Hmi
 from hmi.web.gateway import Gateway
@@ -52,9 +53,8 @@ async def live(
     """Send server-sent events with a page's parts; see `hmi.live`."""
     if hmi.live.unknown(part):
         raise Problem(404, "problem.not_found")
-    caller, address = caller_of(request), address_of(request)
-    holder = f"person {caller.name}" if caller.name else address
-    stream = Stream(holder, known=bool(caller.name) or hmi.pins.knows(address))
+    caller = caller_of(request)
+    stream = Stream(holder_of(request), known=bool(caller.name) or hmi.pins.knows(address_of(request)))
     events = hmi.live.stream(stream, tuple(dict.fromkeys(part)), locale, lambda: hmi.sessions.caller(caller.session))
     # Kept open for another request, the connection of a stream that has ended would keep its place.
     return StreamingResponse(events, media_type="text/event-stream", headers={"connection": "close"})

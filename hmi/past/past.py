@@ -16,8 +16,9 @@ from sqlalchemy import Connection
 from hmi.past.pictures import Stages, read_image, read_stages
 from hmi.past.recipes import PastRecipes
 from hmi.past.tried import Tried, read_tried
+from hmi.past.worker import PastWorker
 from station.channel.panel_queries import LotView, Search
-from station.channel.worker import PanelBusyError, PanelWorker
+from station.channel.worker import PanelBusyError
 from station.inspection.alarm_table import ALARMS
 from station.messages.message import Message, message_in, verbatim
 from station.records.audit import AuditRow
@@ -71,7 +72,7 @@ class Past:
     """
 
     def __init__(self, site: Configuration, broken: str) -> None:
-        self._site, self._broken, self._folder, self._worker = site, broken, site.home / "records", PanelWorker()
+        self._site, self._broken, self._folder, self._worker = site, broken, site.home / "records", PastWorker()
         self.recipes = PastRecipes(site.home, site.recipes_folder, self._worker)
 
     def __enter__(self) -> Self:

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from station.channel.worker import PanelWorker
+from hmi.past.worker import PastWorker
 from station.errors import BadInputError
 from station.inspection.evidence import Evidence
 from station.inspection.press import Press
@@ -71,7 +71,7 @@ class PastRecipes:
         folder: the site's recipe files; None for the shipped ones.
     """
 
-    def __init__(self, home: Path, folder: Path | None, worker: PanelWorker) -> None:
+    def __init__(self, home: Path, folder: Path | None, worker: PastWorker) -> None:
         self._reader, self._records, self._worker = RecipeReader(home, folder), records_folder(home), worker
         self._folder, self._own_folder = folder or shipped_folder(), home / "recipes"
 

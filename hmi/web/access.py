@@ -51,6 +51,12 @@ def address_of(request: Request) -> str:
     return request.client.host if request.client else ""
 
 
+def holder_of(request: Request) -> str:
+    """Return whom a request's places and turns count for: the person, or the address where nobody is logged in."""
+    caller = caller_of(request)
+    return f"person {caller.name}" if caller.name else address_of(request)
+
+
 async def genuine(request: Request) -> Caller:
     """Return the caller of an order that one of our own pages has sent, for the first time.
 

@@ -7,7 +7,7 @@ import uuid
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from fastapi import FastAPI, Request
+from fastapi import Depends, FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
@@ -16,7 +16,8 @@ from starlette.routing import Match, Route
 from hmi.api.model import ApiMessage, Error
 from hmi.jobs.queue import Jobs
 from hmi.past.past import PanelBusyError, Past, RecordsError
-from hmi.web.access import locale_of
+from hmi.past.worker import HOLDER
+from hmi.web.access import holder_of, locale_of
 from hmi.web.assets import Assets
 from hmi.web.context import Hmi
 from hmi.web.gateway import Gateway, actor_of
@@ -95,6 +96,7 @@ def make_app(hmi: Hmi) -> SecurityMiddleware:
         redoc_url=None,
         openapi_url="/api/openapi.json",
         lifespan=running,
+        dependencies=[Depends(_set_holder)],
         routes=[Route("/static/{digest}/{name}", hmi.assets.serve)],
         exception_handlers={
             Problem: _problem,
@@ -109,6 +111,10 @@ def make_app(hmi: Hmi) -> SecurityMiddleware:
     for module in modules():
         app.include_router(module.router, include_in_schema=getattr(module, "IN_SCHEMA", False))
     return SecurityMiddleware(app, (*hmi.settings.names, hmi.settings.host), secure=hmi.settings.tls.enabled)
+
+
+async def _set_holder(request: Request) -> None:
+    HOLDER.set(holder_of(request))
 
 
 async def _sweep(hmi: Hmi) -> None:

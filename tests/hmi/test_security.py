@@ -11,6 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hmi.past.past import PanelBusyError
+from hmi.past.worker import HOLDER
 from hmi.web.app import make_app, make_context
 from hmi.web.gateway import UNNAMED_BURST, UNNAMED_REFILL_S, Gateway
 from hmi.web.login_limiter import FREE_TRIES, LONGEST_WAIT_S, LoginRateLimiter
@@ -251,6 +253,23 @@ class TestLogIn:
         fields = {"name": "admin", "pin": PIN, field: OTHER_PIN}
         assert pages.post(path, csrf=pages.token(), **fields)[0] == 403
         assert noted == [("log_in_refused", "admin", "127.0.0.1")]
+
+    def test_a_request_for_the_records_counts_for_the_person_or_the_address(self, pages, monkeypatch):
+        """So that a greedy one waits for its own."""
+        holders = []
+
+        async def read():
+            holders.append(HOLDER.get())
+            raise PanelBusyError("full")
+
+        monkeypatch.setattr(pages.context.past.recipes, "read", read)
+        pages.asked_from = "192.0.2.7"
+        for path in ("/recipes", "/recipes/strawberry/chart"):
+            assert pages("GET", path)[0] == 409
+        log_in(pages, "Ana", Role.OPERATOR)
+        for path in ("/recipes", "/api/v1/recipes"):
+            assert pages("GET", path)[0] == 409
+        assert holders == ["192.0.2.7", "192.0.2.7", "person Ana", "person Ana"]
 
     def test_two_stations_on_one_machine_log_nobody_out_of_the_other(self, pages, tmp_path):
         """A browser's cookies are a host's, whatever the port."""

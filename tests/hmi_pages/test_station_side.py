@@ -13,6 +13,7 @@ import pytest
 
 from hmi.jobs.queue import MOST_WAITING, Job, JobError, Jobs
 from hmi.past.recipes import PastRecipes, RecipeList
+from hmi.past.worker import PastWorker
 from station.channel.worker import MOST_WAITING as MOST_QUESTIONS
 from station.channel.worker import PanelBusyError, PanelWorker
 from station.settings.recipe import load_recipes
@@ -116,7 +117,7 @@ def test_the_worker_refuses_more_than_it_can_hold() -> None:
 
 def test_recipes_shipped_are_not_edited_and_it_is_said_where_they_lie(tmp_path: Path) -> None:
     async def told(folder: Path | None) -> RecipeList:
-        worker = PanelWorker()
+        worker = PastWorker()
         try:
             return await PastRecipes(tmp_path, folder, worker).read()
         finally:
