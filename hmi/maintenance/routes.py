@@ -295,7 +295,7 @@ _FRAMES: OrderedDict[str, Picture] = OrderedDict()
 
 
 def _ended(hmi: Hmi, ticket: int) -> OperatorCommandView | None:
-    """Return a command that has ended, once the station's state of the pages, which they show, has its end."""
+    """Return a command that has ended, once the state that the pages show has its end; None before."""
     commands = () if hmi.gateway.state is None else hmi.gateway.state.orders
     return next((each for each in commands if each.ticket == ticket and each.state != "executing"), None)
 
