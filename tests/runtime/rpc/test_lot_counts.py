@@ -68,6 +68,7 @@ def test_a_lot_that_returns_after_a_start_is_counted_with_all_its_fruit(bench, s
                 return await counted()
 
     counts = asyncio.run(scenario())
+    assert counts is not None
     with reading(folder) as connection:
         query = "SELECT outcome, count(*) FROM inspections WHERE lot = 'X' GROUP BY outcome"
         stored = dict(plain(connection).execute(query).fetchall())
@@ -80,12 +81,12 @@ def test_a_lot_in_use_stays_in_memory_and_one_that_left_it_is_read_again_while_i
     monkeypatch.setattr(recent_inspections, "_RETRY_S", 0.01)
     stored, read, failures, may_read = list[FruitSummary](), list[str](), list[RecordsError](), threading.Event()
 
-    def read_counts(lot, below):
+    def read_counts(lot: str, below: int) -> Counter[str]:
         read.append(lot)
         assert may_read.wait(60)
         if failures:
             raise failures.pop()
-        return Counter(each.outcome for each in stored if each.lot == lot and each.sequence < below)
+        return Counter[str](each.outcome for each in stored if each.lot == lot and each.sequence < below)
 
     async def scenario():
         inspections = RecentInspections(read_counts)
