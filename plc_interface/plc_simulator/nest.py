@@ -47,7 +47,7 @@ class Nest(Protocol):
     """Brings fruit and takes it away."""
 
     async def arrive(self) -> LaidFruit:
-        """Lay the next fruit."""
+        """Lay the next fruit, in the place of one that has not left."""
         ...
 
     async def leave(self) -> None:

@@ -112,7 +112,7 @@ class LineProgram:
     def __init__(self, plan: FaultPlan | None = None, lot: str = "") -> None:
         self.stage = Stage.CLAIMING
         self._lot, self._lot_wanted = lot, False
-        self._ready = self._jaws_open = self._inhibited = False
+        self._ready = self._jaws_open = self._arm_left = self._inhibited = False
         self._recipe = self._command_sequence = 0
         self.counters = Counters()
         self._plan = plan or FaultPlan()
@@ -134,6 +134,11 @@ class LineProgram:
     def free(self) -> bool:
         """True if the next fruit may enter the nest: the one before is decided, and the jaws are open."""
         return self.stage is Stage.WAITING_FOR_FRUIT and self._fruit is None and self._jaws_open
+
+    @property
+    def may_move(self) -> bool:
+        """True if the fruit in the nest may be moved: it is decided, and the station reports that its arm has left."""
+        return self._fruit is None and self._arm_left
 
     def take_passages(self) -> list[Passage]:
         """Return the fruits decided since the last call."""
@@ -163,7 +168,7 @@ class LineProgram:
         Returns:
             The control block to write.
         """
-        self.cut_wanted = self._ready = self._jaws_open = False
+        self.cut_wanted = self._ready = self._jaws_open = self._arm_left = False
         if inputs is None or not self._alive(inputs, now_s):
             self._lose(now_s)
         else:
@@ -185,7 +190,9 @@ class LineProgram:
         status = BY_NAME["status"].names(int(inputs["status"]))
         self._inhibited = "enable_inhibited" in BY_NAME["more_status"].names(int(inputs["more_status"]))
         self._ready = "trigger_ready" in status
-        self._jaws_open = self._ready or not inputs["active_recipe"]  # without a recipe nothing was ever gripped
+        never_gripped = not inputs["active_recipe"]
+        self._jaws_open = self._ready or never_gripped
+        self._arm_left = "acquiring" not in status or never_gripped
         if not {"writer_owned", "online"} <= status and self.stage is not Stage.CLAIMING:
             self._lose(now_s)
             return

@@ -57,19 +57,23 @@ class LineSimulator:
         self._written: Outputs | None = None
 
     async def run(self, count: int | None) -> Summary:
-        """Run until `count` fruits are decided and the last result is acknowledged; None for until cancelled.
+        """Run until `count` fruits are decided and the last one has left; None for until cancelled.
+
+        A fruit leaves where the arm has left. One that waits behind it takes its place as soon as the jaws are open, so
+        that the line is as fast as the station.
 
         Raises:
             StationError: the nest cannot be filled.
         """
         inputs = None
         fruit: LaidFruit | None = None
+        leaves = False  # a decided fruit is still in the nest
         next_arrival_s = due_s = time.monotonic()
-        while count is None or self.summary.fruits < count or not self._program.free:
+        while count is None or self.summary.fruits < count or leaves or not self._program.free:
             now_s = time.monotonic()
             wanted = count is None or self.summary.fruits < count
             if fruit is None and wanted and self._program.free and now_s >= next_arrival_s:
-                fruit = await self._nest.arrive()
+                fruit, leaves = await self._nest.arrive(), False  # into the place of the one before
                 self.summary.waits_s.append(now_s - next_arrival_s if self._pace.every_s else 0.0)
                 next_arrival_s = next_arrival_s + self._pace.every_s if self._pace.every_s else now_s
             encoder = int(now_s * _ENCODER_COUNTS_PER_S) % 2**32
@@ -90,8 +94,10 @@ class LineSimulator:
                 if fruit is not None:
                     self.summary.add(passage, fruit)
                     self.on_passage(passage, fruit)
-                    fruit = None
-                    await self._nest.leave()
+                    fruit, leaves = None, True
+            if leaves and self._program.may_move:  # at the decision the jaws still hold it
+                leaves = False
+                await self._nest.leave()
             due_s = max(due_s + self._pace.scan_s, time.monotonic())
             await asyncio.sleep(max(0.0, due_s - time.monotonic()))
         return self.summary

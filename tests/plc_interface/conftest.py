@@ -45,6 +45,7 @@ class Rig:
         self.first_sequence = 0x00010001
         self.answers = True
         """The station answers beats."""
+        self.packml_state = PackmlState.EXECUTE
         self.alarms: set[int] = set()
         """Numbers of the active ones."""
         self.refusal: Refusal | None = None
@@ -79,7 +80,7 @@ class Rig:
             events.Beat(
                 now(),
                 StationState(
-                    boot="one", healthy=True, ready=True, why_not_ready=None, packml_state=PackmlState.EXECUTE, mode=1,
+                    boot="one", healthy=True, ready=True, why_not_ready=None, packml_state=self.packml_state, mode=1,
                     recipe_number=3, recipe_checksum=0xCAFE, error_code=0, simulated=True,
                     alarms=sum(1 << number - 1 for number in self.alarms),
                 ),

@@ -33,7 +33,8 @@ def add_on_instruction() -> str:
         EditedDate="2026-01-01T00:00:00.000Z", EditedBy="", SoftwareRevision="v32.00",
     )  # fmt: skip
     ET.SubElement(definition, "Description").text = (
-        "One inspection at a time. A fruit may go on only where done AND passed. "
+        "One inspection at a time. A fruit may go on only where done AND passed; what moves it may run only where "
+        "may_move. "
         "Set the station's modbus.word_order to low_first."
     )
     variables = [each for each in source.variables if each.name not in _LEFT_OUT]

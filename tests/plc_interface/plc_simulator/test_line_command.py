@@ -10,6 +10,7 @@ import sys
 import pytest
 
 from plc_interface.handshake.modes import Arming
+from station.channel.line import PackmlState
 
 PATIENCE_S = 60
 
@@ -39,6 +40,7 @@ def test_fruits_that_are_missing_are_told_by_the_exit_code(number, arguments, co
 def test_a_line_that_has_ended_is_not_missed_as_a_lost_plc(serve):
     async def main():
         async with serve() as rig:
+            rig.packml_state = PackmlState.IDLE
             environment = {**os.environ, "STATION_MODBUS_PORT": str(rig.port)}
             command = (sys.executable, "-m", "station", "line", "--count", "1")
             line = await asyncio.create_subprocess_exec(*command, env=environment, stdout=-1)

@@ -102,8 +102,12 @@ def test_a_good_fruit(plc):
     assert plc.control() == {"enable", "acknowledge"}
     assert plc.written("acknowledged_sequence") == 0x8001FFFE, "high words over half their range too"
     assert plc.written("encoder") == 0x00ABCDEF
+    plc.station.flags("online", "trigger_ready", "acquiring")
+    plc.scan()
+    assert not plc.block["may_move"]
     plc.station.flags("online", "trigger_ready")
     plc.scan()
+    assert plc.block["may_move"]
     plc.scan(inspect=False)
     assert not plc.block["passed"]
     plc.scan()
@@ -149,7 +153,7 @@ def test_a_dead_heartbeat_and_a_late_result_divert(plc):
     assert (plc.block["timed_out"], plc.block["passed"]) == (True, False)
     plc.station.beating = False
     plc.wait(2.1)
-    assert not any(plc.block[name] for name in ("alive", "ready", "busy", "done", "passed", "timed_out"))
+    assert not any(plc.block[name] for name in ("alive", "ready", "busy", "done", "passed", "may_move", "timed_out"))
     assert plc.control() == frozenset()
     words = plc.block["registers"]
     assert decode(BY_NAME["write_key"], [words[BY_NAME["write_key"].address - CONTROL[0].address]]) == 0x5AFE

@@ -47,6 +47,12 @@ def test_the_logic_is_the_structured_texts():
     assert plain.replace("SHR(IN := ", "SHR(") == parts(function_block()).body
 
 
+def test_the_lane_gives_on_what_may_pass_and_what_may_be_moved():
+    lane = BLOCKS["FB_FruitStationLane"]
+    assert "#let_pass := #fruit_station.done AND #fruit_station.passed;" in lane
+    assert "#move_fruit := #fruit_station.may_move;" in lane
+
+
 def test_the_client_reads_and_writes_the_maps_blocks_in_turn():
     link = BLOCKS["FB_FruitStationLink"]
     calls = re.findall(r"MB_MODE := (\d+), MB_DATA_ADDR := (\d+), MB_DATA_LEN := (\d+),\s+MB_DATA_PTR := #(\w+)", link)

@@ -9,7 +9,7 @@ from plc_interface.registers.codec import WordOrder
 from plc_interface.registers.map import BY_NAME
 
 OUTPUTS = (
-    "alive", "ready", "busy", "done", "passed", "refused", "refusal", "timed_out", "result", "status",
+    "alive", "ready", "busy", "done", "passed", "may_move", "refused", "refusal", "timed_out", "result", "status",
     "recipe_busy", "recipe_done", "recipe_failed",
 )  # fmt: skip
 
@@ -95,6 +95,40 @@ def test_a_simulated_result_passes_only_where_it_may(plc):
     plc.station.show(5, 7, result_flags=flags)
     plc.scan(accept_simulated=True)
     assert plc.block["passed"]
+
+
+def test_a_fruit_may_be_moved_once_the_arm_has_left_which_is_after_its_result(plc):
+    plc.scan(3)
+    assert plc.block["may_move"]
+    plc.accepted()
+    assert not plc.block["may_move"], "acquiring may come a scan later"
+    plc.station.show(5, 7)
+    plc.station.flags("online", "result_valid", "acquiring")
+    plc.scan()
+    assert (plc.block["done"], plc.block["passed"], plc.block["may_move"]) == (True, True, False)
+    plc.station.flags("online", "trigger_ready", "acquiring")
+    plc.scan(5)
+    assert not plc.block["may_move"]
+    plc.station.flags("online", "trigger_ready")
+    plc.scan(connected=False)
+    assert not plc.block["may_move"]
+    plc.scan(connected=True)
+    assert (plc.block["done"], plc.block["passed"], plc.block["may_move"]) == (True, True, True)
+    plc.scan(inspect=False)
+    assert plc.block["may_move"]
+
+
+@pytest.mark.parametrize("bits", [("online", "trigger_ready"), ("online", "acquiring")])
+def test_without_the_station_no_fruit_may_be_moved(plc, bits):
+    plc.station.flags(*bits)
+    plc.scan(3)
+    assert plc.block["may_move"] == ("acquiring" not in bits)
+    plc.station.beating = False
+    plc.scan(210)
+    assert not plc.block["alive"]
+    assert not plc.block["may_move"]
+    plc.scan(5, connected=False)
+    assert not plc.block["may_move"]
 
 
 @pytest.mark.parametrize("when", ["before the answer", "before the result", "with the result"])

@@ -86,8 +86,12 @@ def test_the_example_diverts_a_fruit_laid_in_the_place_of_one_taken_away(library
     station.flags("online", "trigger_ready")
     accepted(3)
     station.show(42, 3)
+    station.flags("online", "result_valid", "acquiring")
     scan()
-    assert program["let_pass"]
+    assert (program["let_pass"], program["move_fruit"]) == (True, False)
+    station.flags("online", "trigger_ready")
+    scan()
+    assert (program["let_pass"], program["move_fruit"]) == (True, True)
 
 
 @pytest.mark.parametrize("text", [data_types(), function_block(), example(), configuration()])
