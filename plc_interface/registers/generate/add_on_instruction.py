@@ -3,10 +3,12 @@
 The logic is that of the Structured Text, in the form of Rockwell's "Logix 5000 Controllers Structured Text"
 (1756-PM007) and "Logix 5000 Controllers Import/Export" (1756-RM084): numbers are DINT, a 16-bit word is made
 unsigned by a mask, a structure or a word is copied by COP, and the timer is TONR. COP copies the low word first, so the
-station's `modbus.word_order` has to be `low_first`.
+station's `modbus.word_order` has to be `low_first`. A Logix controller keeps all tags over PROG; its prescan, which
+precedes the first scan, runs the routine `Prescan`.
 """
 
 import re
+from collections.abc import Iterable
 from xml.etree import ElementTree as ET
 
 from plc_interface.registers.generate.st_source import Variable, parts
@@ -17,6 +19,8 @@ NAME = "FB_FruitStation"
 _DIRECTION = {"VAR_INPUT": "Input", "VAR_OUTPUT": "Output"}
 _LEFT_OUT = {"low_word_first", "one", "three"}
 """Of the choice of the word order."""
+_FORGOTTEN = ("alive", "heartbeat_known", "phase", "done", "passed", "may_move", "acknowledging")
+"""By the prescan: another fruit may be in place than before the stop."""
 _CALLS = re.compile(r"\b(?:[A-Z]+_TO_[A-Z]+)\(((?:[^()]|\([^()]*\))*)\)")
 
 
@@ -28,7 +32,7 @@ def add_on_instruction() -> str:
     definitions = ET.SubElement(controller, "AddOnInstructionDefinitions", Use="Context")
     definition = ET.SubElement(
         definitions, "AddOnInstructionDefinition",
-        Use="Target", Name=NAME, Revision="1.0", ExecutePrescan="false", ExecutePostscan="false",
+        Use="Target", Name=NAME, Revision="1.0", ExecutePrescan="true", ExecutePostscan="false",
         ExecuteEnableInFalse="false", CreatedDate="2026-01-01T00:00:00.000Z", CreatedBy="",
         EditedDate="2026-01-01T00:00:00.000Z", EditedBy="", SoftwareRevision="v32.00",
     )  # fmt: skip
@@ -55,10 +59,15 @@ def add_on_instruction() -> str:
             radix = {} if kind == "FBD_TIMER" or kind.startswith("ST_") else {"Radix": "Decimal"}
             ET.SubElement(local, "LocalTag", {"Name": each.name, "DataType": kind, **radix, "ExternalAccess": "None"})
     routines = ET.SubElement(definition, "Routines")
-    content = ET.SubElement(ET.SubElement(routines, "Routine", Name="Logic", Type="ST"), "STContent")
-    for number, line in enumerate(_logic(source.body, variables, constants).splitlines()):
-        ET.SubElement(content, "Line", Number=str(number)).text = line
+    _routine(routines, "Logic", _logic(source.body, variables, constants).splitlines())
+    _routine(routines, "Prescan", [f"{name} := 0;" for name in _FORGOTTEN])
     return document(root)
+
+
+def _routine(routines: ET.Element, name: str, lines: Iterable[str]) -> None:
+    content = ET.SubElement(ET.SubElement(routines, "Routine", Name=name, Type="ST"), "STContent")
+    for number, line in enumerate(lines):
+        ET.SubElement(content, "Line", Number=str(number)).text = line
 
 
 def _kind(variable: Variable) -> str:

@@ -15,9 +15,10 @@ OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
 LIMITS = {"DINT": 2**31, "INT": 2**15}
 
 
-def logic(document: str) -> str:
-    """The routine's text."""
-    return "\n".join(line.text or "" for line in ET.fromstring(document.encode()).iter("Line"))
+def logic(document: str, routine: str = "Logic") -> str:
+    """A routine's text."""
+    lines = ET.fromstring(document.encode()).iterfind(f".//Routine[@Name='{routine}']/STContent/Line")
+    return "\n".join(line.text or "" for line in lines)
 
 
 class LogixBlock:
@@ -26,7 +27,8 @@ class LogixBlock:
     def __init__(self, document: str, parser: Lark, now_s: Callable[[], float]) -> None:
         root = ET.fromstring(document.encode())
         self._now_s = now_s
-        self._statements = self._parsed(parser, document)
+        self._statements = self._parsed(parser, logic(document))
+        self._prescan = self._parsed(parser, logic(document, "Prescan"))
         self._types = {
             each.attrib["Name"]: {
                 member.attrib["Name"]: member.attrib["DataType"] == "BIT"
@@ -51,8 +53,8 @@ class LogixBlock:
             )
 
     @staticmethod
-    def _parsed(parser: Lark, document: str) -> list[Any]:
-        tree: Any = parser.parse(logic(document))
+    def _parsed(parser: Lark, text: str) -> list[Any]:
+        tree: Any = parser.parse(text)
         return tree.children[0].children
 
     def __getitem__(self, name: str) -> Any:
@@ -65,6 +67,10 @@ class LogixBlock:
             assert name in self.kinds, name
             self.variables[name] = [_signed(word, 16) for word in value] if isinstance(value, list) else value
         self._run(self._statements)
+
+    def prescan(self) -> None:
+        """What the controller does with it between PROG and the first scan."""
+        self._run(self._prescan)
 
     def _initial(self, kind: str) -> Any:
         if kind == "FBD_TIMER":

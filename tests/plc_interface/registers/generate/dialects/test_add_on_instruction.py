@@ -39,10 +39,14 @@ def test_the_file_has_the_structure_of_an_add_on_instructions_export():
         names.append(tag.attrib["Name"])
         assert tag.attrib["DataType"] in types
     assert len({name.lower() for name in names}) == len(names)
-    (routine,) = ROOT.iter("Routine")
-    assert (routine.attrib["Name"], routine.attrib["Type"]) == ("Logic", "ST")
-    numbers = [int(line.attrib["Number"]) for line in routine.iter("Line")]
-    assert numbers == list(range(len(numbers)))
+    assert [(each.attrib["Name"], each.attrib["Type"]) for each in ROOT.iter("Routine")] == [
+        ("Logic", "ST"), ("Prescan", "ST"),
+    ]  # fmt: skip
+    runs = [definition.attrib[f"Execute{name}"] for name in ("Prescan", "Postscan", "EnableInFalse")]
+    assert runs == ["true", "false", "false"], "of each there is a routine, or none"
+    for routine in ROOT.iter("Routine"):
+        numbers = [int(line.attrib["Number"]) for line in routine.iter("Line")]
+        assert numbers == list(range(len(numbers)))
 
 
 def test_names_are_logixs():
@@ -145,6 +149,27 @@ def test_ids_over_half_their_range(plc):
     plc.station.show(5, 65_535)
     plc.scan()
     assert plc.block["passed"]
+
+
+@pytest.mark.parametrize("shown", ["before the stop", "after it"])
+def test_a_controller_that_was_in_prog_passes_no_fruit_on_the_result_of_the_one_before(plc, shown):
+    plc.accepted()
+    if shown == "before the stop":
+        plc.station.show(5, 7)
+        plc.scan()
+        assert plc.block["passed"]
+    plc.library.now_s += 600
+    plc.station.show(5, 7)
+    plc.block.prescan()
+    assert not any(plc.block[name] for name in ("alive", "done", "passed", "may_move"))
+    for _ in range(20):
+        plc.scan(fruit_id=8)
+        assert not plc.block["passed"]
+    plc.station.flags("online", "trigger_ready")
+    plc.scan(5)
+    assert plc.block["alive"]
+    assert plc.control() == {"enable"}, "a new rising edge is needed"
+    plc.accepted(fruit_id=9)
 
 
 def test_a_dead_heartbeat_and_a_late_result_divert(plc):

@@ -51,6 +51,7 @@ def test_the_lane_gives_on_what_may_pass_and_what_may_be_moved():
     lane = BLOCKS["FB_FruitStationLane"]
     assert "#let_pass := #fruit_station.done AND #fruit_station.passed;" in lane
     assert "#move_fruit := #fruit_station.may_move;" in lane
+    assert "first_scan := #first_scan," in lane
 
 
 def test_the_client_reads_and_writes_the_maps_blocks_in_turn():

@@ -220,6 +220,53 @@ def test_after_a_lost_heartbeat_a_held_inspect_triggers_nothing(plc):
     assert "trigger" in plc.control()
 
 
+@pytest.mark.parametrize("shown", ["before the stop", "after it"])
+def test_a_plc_that_was_stopped_passes_no_fruit_on_the_result_of_the_one_before(plc, shown):
+    plc.accepted()
+    if shown == "before the stop":
+        plc.station.show(5, 7)
+        plc.scan()
+        assert plc.block["passed"]
+    plc.library.now_s += 600
+    plc.station.show(5, 7)
+    plc.scan(first_scan=True)
+    assert [name for name in OUTPUTS if not zero(plc.block[name])] == []
+    for _ in range(20):
+        plc.scan(first_scan=False, fruit_id=8)
+        assert not plc.block["done"]
+        assert not plc.block["passed"]
+    plc.station.flags("online", "trigger_ready")
+    plc.scan(5)
+    assert plc.block["alive"]
+    assert plc.control() == {"enable"}, "a new rising edge is needed"
+    plc.accepted(fruit_id=9)
+    plc.station.show(6, 9)
+    plc.scan()
+    assert plc.block["passed"]
+
+
+@pytest.mark.parametrize("shown", [False, True], ids=["before the result", "after the result"])
+def test_a_fruit_in_place_while_the_station_had_lost_the_plc_does_not_pass(plc, shown):
+    plc.accepted()
+    if shown:
+        plc.station.show(5, 7)
+        plc.scan()
+        assert plc.block["passed"]
+    plc.station.set(more_status=BY_NAME["more_status"].flags(["enable_inhibited"]))
+    plc.scan()
+    assert not plc.block["passed"]
+    plc.station.set(more_status=0)
+    plc.station.show(5, 7)
+    plc.scan(3)
+    assert (plc.block["done"], plc.block["passed"]) == (True, False)
+    plc.station.flags("online", "trigger_ready")
+    plc.scan(inspect=False)
+    plc.accepted(fruit_id=9)
+    plc.station.show(6, 9)
+    plc.scan()
+    assert plc.block["passed"], "the next fruit"
+
+
 def test_a_lost_link_is_a_lost_heartbeat_and_one_lost_exchange_is_not(plc):
     plc.accepted()
     plc.scan(connected=False)
