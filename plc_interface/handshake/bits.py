@@ -8,7 +8,9 @@ from plc_interface.handshake.work import Row, Work, described, row
 silent = described("Fault: PLC's heartbeat lost.", lambda work: work.fault(Fault.PLC_SILENT))
 writer_lost = described("Fault: writer lost.", lambda work: work.fault(Fault.WRITER_LOST))
 count_loss = described("Count the loss of communication.", lambda work: work.count("count_communication"))
-lot_is_good = described("The lot id is printable ASCII.", lambda work: work.state.inputs.lot is not None)
+lot_is_good = described(
+    "The lot id was written since the start, and is printable ASCII.", lambda work: work.state.inputs.lot is not None
+)
 
 
 def latch(work: Work) -> None:

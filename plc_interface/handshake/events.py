@@ -29,7 +29,7 @@ class Inputs:
     plc_heartbeat: int = 0
     encoder: int = 0
     lot: str | None = ""
-    """None where the registers do not hold printable ASCII."""
+    """None where the registers do not hold printable ASCII, or were not written since this start."""
     fruit_length_mm_x10: int = 0
     size_class: int = 0
 

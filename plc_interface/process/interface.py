@@ -43,7 +43,7 @@ class Interface:
         self._loop = asyncio.get_running_loop()
         self._timer: asyncio.TimerHandle | None = None
         self._station = StationLink(endpoint, settings, self.feed, self._line)
-        self._inputs = ev.Inputs()
+        self._inputs = ev.Inputs(lot=None)  # none was written: the one in force is the journal's
         self._state = restarted(journal.read(), now(), settings.station_lost_after_s)
         self._statistics = Statistics()
         self._before_reset = (0, 0)

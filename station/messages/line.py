@@ -20,8 +20,8 @@ WRONG_ACKNOWLEDGEMENT = define(
 )
 BAD_LOT = define(
     "line.bad_lot",
-    "the lot id is not printable ASCII and was not taken over: write it without a barcode reader's line end, and latch "
-    "it again",
+    "the lot id is not printable ASCII, or was not written since the interface started, and was not taken over: write "
+    "it without a barcode reader's line end, and latch it again",
 )
 COMMAND_BUSY = define(
     "line.command_busy", "the PLC gave a command while another was carried out: wait for command_done or command_failed"
