@@ -29,7 +29,7 @@ from station.vocabulary import Refusal
 log = logging.getLogger(__name__)
 
 DEADLINE_S = 25.0
-"""Less than the PLC interface's own deadline for a command."""
+"""With the wait for the command before. Less than the PLC interface's own deadline for a command."""
 LINE_SILENT_S = 2.0
 STOP_WITHIN_S = 0.5
 PRODUCTION, MAINTENANCE, MANUAL = 1, 2, 3
@@ -136,12 +136,13 @@ class PlcCommands:
         """Execute one command by the name and role of who gave it."""
         log.info("%s (%s) orders %s %s", *by, command.command, command.argument)
         before, alarms = self._value_before(command.command), self._service.alarms.alarms
-        async with contextlib.nullcontext() if command.command in _AT_ONCE else self._turn:
-            try:
-                async with asyncio.timeout(DEADLINE_S):
+        try:
+            # With its wait for the command before: the PLC reads timed_out soon after, and nothing may begin then.
+            async with asyncio.timeout(DEADLINE_S):
+                async with contextlib.nullcontext() if command.command in _AT_ONCE else self._turn:
                     why = await self._execute(command, by)
-            except TimeoutError:
-                why = messages.TOO_SLOW(command=command.command, limit_s=DEADLINE_S, activity=self._activity())
+        except TimeoutError:
+            why = messages.TOO_SLOW(command=command.command, limit_s=DEADLINE_S, activity=self._activity())
         if why is not None:
             log.warning("%s was not done: %s", command.command, why)
         done = CommandDone(done=why is None, why=why)
