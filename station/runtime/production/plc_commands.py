@@ -71,6 +71,7 @@ class PlcCommands:
         """By the last order of a person, also before its file has it."""
         self._stop_file, self._mode_file = asyncio.Lock(), asyncio.Lock()
         self._storing_mode: asyncio.Task[bool] | None = None
+        self._storing_reset: asyncio.Task[bool] | None = None
 
     @property
     def line_age_s(self) -> float | None:
@@ -283,7 +284,9 @@ class PlcCommands:
             return why_not
         state, self._stop_wanted = service.state, False
         service.allow()
-        await self._store_stop()
+        # As of a mode: a write that outlasts the reset's deadline could replace that of a stop that comes next.
+        self._storing_reset = asyncio.create_task(self._store_stop())
+        await asyncio.shield(self._storing_reset)
         if service.stopped_by_person:
             return messages.STOPPED_MEANWHILE()
         if state in {State.IDLE, State.RETREATING_READY}:
