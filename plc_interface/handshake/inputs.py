@@ -115,7 +115,8 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
             work.signals.append(off)
     _apply_first_write(work, event)
     changed = event.inputs.acknowledged_sequence not in {before.acknowledged_sequence, 0}
-    had = {state.journal.acknowledged, state.taken or state.journal.acknowledged}
+    acknowledged = state.journal.acknowledged
+    had = {acknowledged, state.journal.plc_taken or acknowledged, state.taken or acknowledged}
     left_high = seen is None and event.inputs.acknowledged_sequence in had
     _acknowledged(work, event, rose, changed=changed, left_high=left_high)
     if "acknowledge" in fell:
@@ -179,7 +180,9 @@ def _acknowledged(work: Work, event: PlcWrote, rose: frozenset[str], *, changed:
         work.signals.append(Signal.ACKNOWLEDGED)
     elif after and sequence:
         work.signals.append(Signal.ACKNOWLEDGE_AFTER)
-    elif (by_bit and not left_high) or (changed and sequence not in {state.journal.acknowledged, state.taken}):
+    elif (by_bit and not left_high) or (
+        changed and sequence not in {state.journal.acknowledged, state.journal.plc_taken, state.taken}
+    ):
         if state.journal.acknowledged < sequence <= state.journal.highest:
             work.update_journal(disbelieved=sequence)
         work.signals.append(Signal.WRONG_ACKNOWLEDGEMENT)

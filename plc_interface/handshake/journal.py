@@ -41,7 +41,13 @@ class Journal(_Persistent):
     highest: int = Field(default=0, ge=0, lt=2**32)
     """The highest sequence of an accepted trigger, or of one of `hidden`: the next one is higher."""
     acknowledged: int = Field(default=0, ge=0, lt=2**32)
-    """The PLC has taken everything up to here."""
+    """The PLC has taken everything up to here, or was never shown it."""
+    plc_taken: int | None = Field(default=None, ge=0, lt=2**32)
+    """What the PLC itself took last, where `acknowledged` has passed over `hidden` since; its register may still
+    hold it.
+
+    None where that is `acknowledged`, so that a version that does not know this field reads the journal all the same.
+    """
     disbelieved: int = Field(default=0, ge=0, lt=2**32)
     """The last inspection that the PLC acknowledged before its outcome was shown: a start does not make that right."""
     accepted_id: int = Field(default=0, ge=0, le=65_535)

@@ -100,16 +100,18 @@ def pass_over_hidden(work: Work) -> None:
     oldest = min(waiting, default=2**32)
     passed = [sequence for sequence in state.journal.hidden if sequence < oldest]
     if passed:
+        journal = state.journal
+        plc_taken = journal.acknowledged if journal.plc_taken is None else journal.plc_taken
         acknowledge(work, max(passed))
         left = tuple(sequence for sequence in state.journal.hidden if sequence not in passed)
-        work.update_journal(hidden=left)
+        work.update_journal(hidden=left, plc_taken=plc_taken)
 
 
 def acknowledge(work: Work, sequence: int) -> None:
     """Record that the PLC has taken everything up to here, and notify the station."""
-    acknowledged = max(work.state.journal.acknowledged, sequence)
-    work.update_journal(acknowledged=acknowledged)
-    work.actions.append(NotifyAcknowledged(acknowledged))
+    if sequence > work.state.journal.acknowledged:
+        work.update_journal(acknowledged=sequence, plc_taken=None)
+    work.actions.append(NotifyAcknowledged(work.state.journal.acknowledged))
 
 
 def publish_if_other(work: Work, theirs: Outcome) -> None:

@@ -78,6 +78,53 @@ def test_what_was_called_off_is_passed_over_by_the_first_write_after_a_start(ben
     assert (made.state.journal.acknowledged, made.state.journal.hidden) == (42, ())
 
 
+def called_off_behind(bench):
+    """Return a bench whose PLC took 41; a trigger after it was refused as lost, and its inspection 42 is called off."""
+    made = shown(bench)
+    made.write("enable", "acknowledge", acknowledged_sequence=41)
+    made.write("enable")
+    made.write("enable", "trigger", trigger_id=8)
+    made.feed(ev.BeginFailed, made.state.pending.number)
+    made.write("enable")
+    made.link(Open(running=(42, 8), outcomes=()))
+    assert (made.state.journal.acknowledged, made.state.journal.plc_taken) == (42, 41)
+    return made
+
+
+def test_a_plc_that_writes_again_what_it_took_is_right_also_where_one_behind_it_was_called_off(bench):
+    """As the function block does, whose registers are 0 while it does not see the station's heartbeat."""
+    made = called_off_behind(bench)
+    made.link(Open(running=None, outcomes=()), boot="2")
+    made.write("enable", acknowledged_sequence=0)
+    made.write("enable", acknowledged_sequence=41)
+    assert made.state.faults == ()
+    made.write("enable", acknowledged_sequence=40)
+    assert made.state.faults == (Fault.WRONG_ACKNOWLEDGEMENT,)
+
+
+def test_so_is_one_that_does_so_after_a_start(bench):
+    made = bench(Journal.model_validate_json(called_off_behind(bench).state.journal.model_dump_json()))
+    made.feed(ev.WriterGranted)
+    made.write("enable", acknowledged_sequence=0)
+    made.write("enable", acknowledged_sequence=41)
+    assert made.state.faults == ()
+
+
+def test_a_bit_left_high_for_what_it_took_is_right_after_a_reconnect(bench):
+    made = called_off_behind(bench)
+    made.feed(ev.WriterWithdrawn)
+    made.feed(ev.WriterGranted)
+    made.write("enable", "acknowledge", acknowledged_sequence=41)
+    assert made.state.faults == (Fault.WRITER_LOST,)
+
+
+def test_what_the_plc_takes_next_is_the_last_it_took(bench):
+    made = called_off_behind(bench)
+    next_fruit(made, 43)
+    made.write("enable", "acknowledge", acknowledged_sequence=43)
+    assert (made.state.journal.acknowledged, made.state.journal.plc_taken) == (43, None)
+
+
 def test_a_wrong_acknowledgement_of_what_was_taken_does_not_hide_an_early_one(bench):
     before = shown(bench)
     before.write("enable", "acknowledge", acknowledged_sequence=41)
