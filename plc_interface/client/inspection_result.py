@@ -38,8 +38,8 @@ class InspectionResult:
 
     @property
     def passed(self) -> bool:
-        """True if the fruit may go on: PASS without a flag against it. A simulated result counts as its outcome."""
-        return self.outcome == "PASS" and "pass" in self.flags and "late" not in self.flags
+        """True if the fruit may go on: PASS, measured, in time. A simulated result counts as its outcome."""
+        return self.outcome == "PASS" and {"pass", "area_valid"} <= self.flags and "late" not in self.flags
 
 
 def published_result(block: Mapping[str, Any]) -> InspectionResult | None:
