@@ -151,14 +151,14 @@ class StationClient(RegisterLink):
             DeadlineMissedError: the station does not note it in time.
         """
         now = await self.scan()
-        if now["acknowledged_sequence_echo"] == sequence:
+        if now["acknowledged_sequence_echo"] >= sequence:
             return
         if now["result_sequence"] != sequence:
             raise NotReadyError(f"result {sequence} is not the one shown, which is {now['result_sequence'] or 'none'}")
         await self.write({"acknowledged_sequence": sequence})
         await self._until_raised(
             "acknowledge",
-            lambda now: now["acknowledged_sequence_echo"] == sequence,
+            lambda now: now["acknowledged_sequence_echo"] >= sequence,  # higher where one behind it was called off
             f"the acknowledgement of result {sequence}",
         )
 

@@ -327,7 +327,7 @@ class LineProgram:
         self._go(Stage.ACKNOWLEDGING, now_s)
 
     def _await_acknowledged(self, inputs: Values, now_s: float) -> None:
-        if int(inputs["acknowledged_sequence_echo"]) == self._taken:
+        if int(inputs["acknowledged_sequence_echo"]) >= self._taken:  # higher where one behind it was called off
             self._acknowledge, self._closed = False, self._taken
             waits = self._fruit is not None and self._fruit.accepted
             self._go(Stage.WAITING_FOR_RESULT if waits else Stage.WAITING_FOR_FRUIT, now_s)

@@ -75,6 +75,19 @@ def test_what_is_not_measured_is_none_and_does_not_pass(serve, no_contact):
     assert result.flags == {"partial", "simulated"}
 
 
+def test_a_result_is_acknowledged_also_where_an_inspection_behind_it_was_called_off(serve):
+    async def main():
+        async with serve() as rig, StationClient(HOST, rig.port) as client:
+            await client.arm()
+            rig.state.journal = rig.state.journal.model_copy(update={"hidden": (rig.first_sequence + 1,)})
+            result = await client.inspect(7)
+            await client.acknowledge(result.sequence)
+            return result.sequence, rig.state.journal.acknowledged
+
+    sequence, acknowledged = asyncio.run(main())
+    assert acknowledged == sequence + 1
+
+
 def test_twenty_fruits_in_a_row_each_get_their_own(serve):
     async def main():
         async with serve() as rig, StationClient(HOST, rig.port) as client:

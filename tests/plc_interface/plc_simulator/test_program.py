@@ -29,7 +29,7 @@ class Station:
         self.bits = {"online", "trigger_ready"}
         self.results, self.up, self.accepted = [], frozenset(), []
         self.alive, self.refuses, self.answers, self.acknowledged = True, "", True, []
-        self.measures, self.length = True, 0
+        self.measures, self.length, self.called_off = True, 0, 0
 
     def scan(self, outputs):
         up = BY_NAME["control"].names(outputs["control"])
@@ -49,7 +49,7 @@ class Station:
             self.bits.discard("trigger_acknowledged")
         if outputs["acknowledged_sequence"] == self.values["result_sequence"] != 0:
             self.acknowledged.append(outputs["acknowledged_sequence"])
-            self.values["acknowledged_sequence_echo"] = outputs["acknowledged_sequence"]
+            self.values["acknowledged_sequence_echo"] = outputs["acknowledged_sequence"] + self.called_off
             self.show(0, 0)
         if self.measures and self.results and not self.values["result_sequence"]:
             self.show(*self.results.pop(0))
@@ -145,6 +145,14 @@ def test_results_of_an_earlier_run_are_taken_away_and_decide_nothing():
     assert line.inspect().sequence == 41
     assert line.program.counters.stale == 2
     assert station.acknowledged[:2] == [7, 8]
+
+
+def test_a_result_is_acknowledged_also_where_an_inspection_behind_it_was_called_off():
+    station = Station()
+    station.called_off = 1
+    line = Line(station)
+    assert line.inspect().decision is Decision.PASS
+    line.until(lambda: line.program.free)
 
 
 @pytest.mark.parametrize("copy", ["result_sequence_again", "result_sequence_end"])
