@@ -65,6 +65,7 @@ class AlarmId(StrEnum):
     CONNECTION_FLOOD = "connection_flood"
     RECORDS_LOST = "records_lost"
     ARM_NOT_READY = "arm_not_ready"
+    PLC_JOURNAL_NOT_WRITABLE = "plc_journal_not_writable"
 
 
 class AlarmRow(NamedTuple):
@@ -130,6 +131,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     AlarmId.CONNECTION_FLOOD: AlarmRow(34, Priority.LOW, texts.CONNECTION_FLOOD),
     AlarmId.RECORDS_LOST: AlarmRow(35, Priority.HIGH, texts.RECORDS_LOST),
     AlarmId.ARM_NOT_READY: AlarmRow(36, Priority.MEDIUM, texts.ARM_NOT_READY),
+    AlarmId.PLC_JOURNAL_NOT_WRITABLE: AlarmRow(37, Priority.LOW, texts.PLC_JOURNAL_NOT_WRITABLE),
 }
 """Every alarm, in the order of its number."""
 

@@ -346,3 +346,20 @@ RECORDS_LOST = AlarmTexts(
         "alarm.",
     ),
 )
+PLC_JOURNAL_NOT_WRITABLE = AlarmTexts(
+    define(
+        "alarm.cause.plc_journal_not_writable",
+        "The PLC interface's journal cannot be written: the disk is full or read-only, or its folder is another "
+        "user's.",
+    ),
+    define(
+        "alarm.consequence.plc_journal_not_writable",
+        "Inspections continue; but if the PLC interface or the machine is started again meanwhile, results that the "
+        "PLC has not acknowledged may be lost.",
+    ),
+    define(
+        "alarm.action.plc_journal_not_writable",
+        "Free space on the disk of the state folder, or make the folder that the detail names writable; do not start "
+        "the PLC interface again before.",
+    ),
+)

@@ -76,4 +76,5 @@ PROVOCATIONS: dict[AlarmId, tuple[Provocation, ...]] = {
     AlarmId.CONNECTION_FLOOD: (Provocation("process", "connections"),),
     AlarmId.RECORDS_LOST: (Provocation("files", "database_damaged"), Provocation("files", "database_removed")),
     AlarmId.ARM_NOT_READY: (Provocation("arm", "safeguard"), Provocation("arm", "wrong")),
+    AlarmId.PLC_JOURNAL_NOT_WRITABLE: (Provocation("files", "plc_journal"),),
 }

@@ -132,6 +132,7 @@ class PlcCommands:
         faults = {fault.part: fault.what for fault in reversed(line.faults)}
         alarms.update(AlarmId.GATE_NOT_FIRED, faults.get("reject"))
         alarms.update(AlarmId.CAN_NODE_LOST, faults.get("can"))
+        alarms.update(AlarmId.PLC_JOURNAL_NOT_WRITABLE, faults.get("journal"))
 
     async def execute(self, command: Command, by: tuple[str, str] = (PLC, PLC)) -> CommandDone:
         """Execute one command by the name and role of who gave it."""
