@@ -229,11 +229,13 @@ class GetRegisters(ChannelMessage):
 
 
 class Registers(ChannelMessage):
-    """All registers of the map, in the order of their addresses."""
+    """All registers of the map, in the order of their addresses, and the handshake's faults."""
 
     registers: tuple[RegisterView, ...]
     age_s: float | None
     """Since the PLC interface sent them; None if it has not yet."""
+    faults: tuple[Message, ...] = ()
+    """What the PLC does wrong, until it gives clear_error."""
 
 
 class ReadLog(ChannelMessage):

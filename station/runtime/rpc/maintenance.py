@@ -193,8 +193,9 @@ class PanelMaintenance:
         self._plc_commands.request_registers()
         while self._plc_commands.registers[1] < asked_s and time.monotonic() < asked_s + REGISTERS_DEADLINE_S:
             await asyncio.sleep(0.05)
-        told, at_s = self._plc_commands.registers
-        return Registers(registers=told, age_s=time.monotonic() - at_s if at_s else None)
+        (told, at_s), report = self._plc_commands.registers, self._plc_commands.last_report
+        faults = () if report is None else tuple(each.what for each in report.faults if each.part == "handshake")
+        return Registers(registers=told, age_s=time.monotonic() - at_s if at_s else None, faults=faults)
 
     async def log_lines(self, request: ReadLog) -> Log:
         """Return the last lines of the log."""
