@@ -239,6 +239,8 @@ def short_view(published: Outcome, recipe: str, areas_mm2: Iterable[float | None
 
 def _new_fruit(now: Inspection, published: Outcome) -> tuple[Fruit, ReadStep | None]:
     """Make the view of a new fruit, with the picture of its deciding step."""
+    # An outcome of the PLC interface's own has the PLC's lot, which is none where a person named it at the panel.
+    published = published.model_copy(update={"lot": now.trigger.lot})
     record, revision = now.record(), now.active.snapshot.revision
     step = deciding_step(record)
     look = None if step is None else _step_reader(now.seen[step])

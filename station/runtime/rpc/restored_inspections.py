@@ -33,7 +33,7 @@ from station.settings.recipe_versions import parse_recipe
 from station.vision.contact import Image
 
 _LAST = (
-    "SELECT i.sequence, i.standing, coalesce(r.name, 'none') FROM inspections AS i "
+    "SELECT i.sequence, i.standing, coalesce(r.name, 'none'), i.lot FROM inspections AS i "
     "LEFT JOIN recipe_snapshots AS r ON r.sha256 = i.recipe_sha256 "
     "WHERE i.standing NOT NULL ORDER BY i.sequence DESC LIMIT ?"
 )
@@ -70,7 +70,9 @@ def read_recent(folder: Path, deadline_s: Callable[[Recipe], float]) -> Restored
         areas: dict[int, list[float | None]] = {row[0]: [] for row in rows}
         for sequence, area_mm2 in database.execute(_AREAS, (json.dumps(list(areas)),)):
             areas[sequence].append(area_mm2)
-        short = tuple(short_view(Outcome.model_validate_json(row[1]), row[2], areas[row[0]]) for row in rows)
+        short = tuple(
+            short_view(_of_lot(Outcome.model_validate_json(row[1]), row[3]), row[2], areas[row[0]]) for row in rows
+        )
         full = (_full(connection, folder, each.sequence, deadline_s) for each in short[-MOST_IN_FULL:])
         named = list(dict.fromkeys(each.lot for each in reversed(short) if each.lot))[:MOST_IN_FULL]
         lots = {lot: _counts(database, lot, short[-1].sequence + 1) for lot in reversed(named)}
@@ -106,8 +108,14 @@ def _full(
         return None
     step = deciding_step(judged)
     look = None if step is None else _step_reader(record, step)
-    fruit = fruit_view(record.standing, judged, recipe, snapshot.revision, limit_s, None if look is None else step)
+    standing = _of_lot(record.standing, record.trigger.lot)
+    fruit = fruit_view(standing, judged, recipe, snapshot.revision, limit_s, None if look is None else step)
     return RestoredFruit(fruit, look)
+
+
+def _of_lot(outcome: Outcome, lot: str) -> Outcome:
+    """Return an outcome with its trigger's lot: one of the PLC interface's own has none where the panel named it."""
+    return outcome.model_copy(update={"lot": lot})
 
 
 def _step_reader(record: FullRecord, step: int) -> ReadStep | None:
