@@ -85,14 +85,16 @@ class Robotiq2F85:
     async def activate(self) -> GripperReading:
         """Make the gripper ready. Idempotent: one that is active does not move, even if it reports a passing fault.
 
-        Otherwise **the fingers travel their whole way**, also when the wait for them is cancelled, and `stop` does not
-        end it: nothing may be between them.
+        Otherwise **the fingers travel their whole way**, also when the wait for them is cancelled, and `stop` ends it
+        only before they do: nothing may be between them.
 
         Raises:
             GripperFaultError: a fault that a reset and an activation do not clear.
+            GripperStoppedError: `stop` was called before the fingers travelled; the gripper is not active.
             GripperTimeoutError: it answers, but does not become active.
             GripperError: the wire.
         """
+        stops = self._stops
         async with self._turn:
             status, at_s = await self._poll()
             if self._is_active(status):
@@ -104,6 +106,7 @@ class Robotiq2F85:
                 await self._wait_until(deadline_s, time.monotonic(), messages.STEP_RESET(), None)
                 await self.link.reset()
             await asyncio.sleep(_RESET_HOLD_S)
+            self._go_on_unless_stopped(stops)  # until here nothing has moved
             await self.link.begin_activation()
             began_s = time.monotonic()
             while True:

@@ -74,6 +74,8 @@ class DeviceManager:
             or (configuration.gripper.driver == "urcap" and configuration.gripper.urcap.host.startswith("127."))
         )
         self._confirmed_clear = False
+        self._recovery = asyncio.Lock()
+        """Held while a lost activation is being restored, which may move the arm and moves the fingers."""
         self._gripper_reading: GripperReading | None = None
         self.joints_rad: tuple[float, ...] | None = None
         """The arm's joint positions as last monitored; None where it does not report them."""
@@ -228,33 +230,49 @@ class DeviceManager:
         fault = self.monitors[ARM].fault if ARM in self.monitors else None
         return isinstance(fault, ArmFault) and fault.cause is ArmCause.WATCHDOG
 
-    async def activate_if_safe(self) -> None:
+    async def activate_if_safe(self, may: Callable[[], bool]) -> None:
         """Activate a gripper that lost its activation, unless a fruit may be between the jaws: it would be crushed.
 
         Nothing is between them if the arm is away from the nest, or a person has confirmed it. With the jaws open at
         the nest the arm leaves the nest first; a gripper that was without power cannot report whether they are open.
 
-        Raises:
-            StationError: activation is not safe, with the remedy; or it failed.
-        """
-        reading = await self.cell.gripper.read()
-        if _is_activated(reading):
-            self._confirmed_clear = False
-            return
-        try:
-            if not self._confirmed_clear:
-                await self._leave_the_nest()
-            self._confirmed_clear = False
-            await self.cell.gripper.activate()
-        except (GripperNotActiveError, GripperFaultError) as error:
-            self._not_activated = error
-            raise
-        except GripperTimeoutError as error:
-            self._not_activated = GripperNotActiveError(error.cause, error.remedy)
-            raise
-        self._not_activated = None
+        Args:
+            may: whether the station may make itself ready. Once it may not, no further motion begins.
 
-    async def _leave_the_nest(self) -> None:
+        Raises:
+            StationError: activation is not safe, with the remedy; or it failed or was stopped.
+        """
+        async with self._recovery:
+            reading = await self.cell.gripper.read()
+            if _is_activated(reading):
+                self._confirmed_clear = False
+                return
+            try:
+                if not self._confirmed_clear:
+                    await self._leave_the_nest(may)
+                if not may():
+                    return
+                self._confirmed_clear = False
+                await self.cell.gripper.activate()
+            except (GripperNotActiveError, GripperFaultError) as error:
+                self._not_activated = error
+                raise
+            except GripperTimeoutError as error:
+                self._not_activated = GripperNotActiveError(error.cause, error.remedy)
+                raise
+            self._not_activated = None
+
+    async def end_recovery(self) -> None:
+        """Stop the restoring of a lost activation, and wait for its end; nothing is done where there is none.
+
+        Fingers that travel already come to their end, which nothing but their power prevents.
+        """
+        if self._recovery.locked():
+            await self.halt()
+            async with self._recovery:
+                pass
+
+    async def _leave_the_nest(self, may: Callable[[], bool]) -> None:
         refusal = GripperNotActiveError(gripper_messages.JAWS_UNKNOWN(), gripper_messages.REMEDY_EMPTY_JAWS())
         if self._arm is None:
             raise refusal
@@ -263,7 +281,8 @@ class DeviceManager:
             raise state.fault.again()
         gripper, width_mm = self.cell.gripper, self.cell.gripper.known_width_mm
         if state.at == "nest" and width_mm is not None and are_open(width_mm, gripper.max_width_mm):
-            await self._arm.move_to("above_nest")
+            if may():
+                await self._arm.move_to("above_nest")
         elif state.at not in {"home", "above_nest"}:
             raise refusal
 

@@ -125,7 +125,8 @@ class Housekeeping:
             self._service.alarms.report_lost_records(registry.records.notices)
         with contextlib.suppress(StationError):
             if activate:
-                await self._devices.activate_if_safe()
+                # A stop, or another mode, may have come while the records were opened, and may come meanwhile.
+                await self._devices.activate_if_safe(lambda: self._service.makes_itself_ready)
             elif play:
                 await self._devices.restart_program()
         self._again_s = time.monotonic() + self._pause_s

@@ -191,6 +191,8 @@ class PlcCommands:
         self._service.set_mode(production=mode == PRODUCTION)
         # A write that outlasts its order is not left behind, or it could replace the next order's.
         self._storing_mode = asyncio.create_task(self._store_mode())
+        if not self._service.makes_itself_ready:
+            await self._devices.end_recovery()
         return None if await asyncio.shield(self._storing_mode) else messages.MODE_NOT_STORED(mode=mode)
 
     async def _store_mode(self) -> bool:
@@ -239,6 +241,7 @@ class PlcCommands:
         service.stop()
         if service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
             service.runner.post(Event.STOP, operation.STOPPED_AT_PANEL())
+        await self._devices.end_recovery()
         reached = await service.runner.until(lambda state: state in WAITING or not service.stopped_by_person)
         if reached not in WAITING:
             return messages.STARTED_MEANWHILE()

@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,6 +68,7 @@ class Bench:
     devices: DeviceManager
     gripper: Gripper
     arm: Arm
+    may: Callable[[], bool] = lambda: True
 
     async def check(self, name=GRIPPER):
         """Check a device as its monitor does; its fault from now on."""
@@ -82,7 +84,7 @@ class Bench:
     async def activate(self):
         """Activate as housekeeping does; why it was not done."""
         try:
-            await self.devices.activate_if_safe()
+            await self.devices.activate_if_safe(self.may)
         except Exception as error:  # noqa: BLE001 (the test names it)
             return error
         return None
@@ -193,5 +195,56 @@ def test_an_activation_that_came_to_no_end_is_reported_and_tried_again(bench):
         bench.gripper.fails = None
         assert await bench.activate() is None
         assert await bench.check() is None
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(("stopped_at", "ends_at"), [("nest", "nest"), ("above_nest", "above_nest")])
+def test_nothing_moves_any_more_once_the_station_may_not_make_itself_ready(bench, stopped_at, ends_at):
+    """At the nest the stop comes before anything has moved, above it while the arm leaves the nest."""
+
+    async def scenario():
+        bench.gripper.active, bench.gripper.known_width_mm = False, OPEN_MM
+        bench.may = lambda: bench.arm.at != stopped_at
+        assert await bench.activate() is None
+        assert (bench.arm.at, bench.gripper.activations) == (ends_at, 0)
+
+        bench.may = lambda: True
+        assert await bench.activate() is None
+        assert (bench.arm.at, bench.gripper.activations) == ("above_nest", 1)
+
+    asyncio.run(scenario())
+
+
+def test_the_end_of_a_recovery_stops_the_gripper_and_waits_for_fingers_that_travel_already(bench, monkeypatch):
+    async def scenario():
+        travelling, arrived, ended, stops = asyncio.Event(), asyncio.Event(), list[str](), list[str]()
+
+        async def travel():
+            travelling.set()
+            await arrived.wait()
+            ended.append("activation")
+
+        async def stop():
+            stops.append("gripper")
+
+        async def end_recovery():
+            await bench.devices.end_recovery()
+            ended.append("recovery")
+
+        monkeypatch.setattr(bench.gripper, "activate", travel)
+        monkeypatch.setattr(bench.gripper, "stop", stop, raising=False)
+        monkeypatch.setattr(bench.arm, "stop", stop, raising=False)
+        await end_recovery()
+        assert (stops, ended) == ([], ["recovery"]), "nothing is stopped where nothing is restored"
+        bench.gripper.active, bench.arm.at = False, "home"
+        activating = asyncio.create_task(bench.activate())
+        await travelling.wait()
+        ending = asyncio.create_task(end_recovery())
+        while len(stops) < 2:
+            await asyncio.sleep(0)
+        arrived.set()
+        await asyncio.gather(activating, ending)
+        assert ended == ["recovery", "activation", "recovery"]
 
     asyncio.run(scenario())

@@ -19,6 +19,7 @@ from station.inspection.states import State
 from station.messages import commands, readiness
 from station.runtime.production.plc_commands import PlcCommands
 from station.settings.hmi import panel_endpoint
+from tests.runtime.ball import give, stop
 
 
 @pytest.mark.timeout(240)
@@ -108,5 +109,47 @@ def test_a_persons_stop_is_ended_by_a_person_and_not_by_a_plc_that_resets_by_its
             await give(cell, OperatorCommandName.START)
             await cell.reach(State.IDLE)
             assert (await cell.line.order(CommandName.RESET)).done
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_a_stop_while_a_lost_activation_is_being_restored_keeps_the_fingers_where_they_are(bench):
+    async def scenario():
+        async with bench(bench=False) as cell:
+            await cell.choose("strawberry")
+            await cell.line.ready()
+            service, configuration = cell.station.service, cell.configuration
+            link, resetting, free, activations = (
+                service._devices.cell.gripper.link,
+                asyncio.Event(),
+                asyncio.Event(),
+                list[str](),
+            )
+            reset, begin_activation = link.reset, link.begin_activation
+
+            async def slow_reset():
+                resetting.set()
+                await free.wait()
+                await reset()
+
+            async def noted():
+                activations.append(cell.phase)
+                await begin_activation()
+
+            link.reset, link.begin_activation = slow_reset, noted
+            cell.twin.boards["gripper"].set("power_cut")
+            cell.twin.boards["gripper"].clear()
+            async with asyncio.timeout(60):
+                await resetting.wait()
+            async with ChannelClient(panel_endpoint(configuration.hmi, configuration.home), "the station") as panel:
+                stopping = asyncio.create_task(stop(panel))
+                await cell.until(lambda: service.stopped_by_person)
+                free.set()
+                await stopping
+                assert activations == []
+                assert (await give(panel, OperatorCommandName.START)).state == "done"
+            assert cell.phase is State.IDLE
+            assert activations == [State.HELD], "the start restores it"
 
     asyncio.run(scenario())
