@@ -67,6 +67,7 @@ class Service:
         self._in_production = True
         self.manual_activity: Message | None = None
         """The activity at the panel that moves something by hand, in manual mode alone; None without one."""
+        self._end_manual: Callable[[], Awaitable[None]] | None = None
         self.ending = False
         """The end of the process was requested."""
         self.stopped_by_person = False
@@ -155,13 +156,22 @@ class Service:
         self._reset_given = self._reset_given and production
 
     @contextlib.contextmanager
-    def manual(self, activity: Message) -> Iterator[None]:
-        """Keep mode and devices to an activity at the panel that moves something; a refused person reads which."""
-        self.manual_activity = activity
+    def manual(self, activity: Message, end: Callable[[], Awaitable[None]]) -> Iterator[None]:
+        """Keep mode and devices to an activity at the panel that moves something; a refused person reads which.
+
+        Args:
+            end: ends the activity at a person's stop; it returns once nothing moves by it.
+        """
+        self.manual_activity, self._end_manual = activity, end
         try:
             yield
         finally:
-            self.manual_activity = None
+            self.manual_activity = self._end_manual = None
+
+    async def end_manual(self) -> None:
+        """End the activity at the panel that moves something by hand, if there is one."""
+        if self._end_manual is not None:
+            await self._end_manual()
 
     def listen(self, on_published: Callable[[Outcome], None]) -> None:
         """Call a function, in place of the one before, once with every outcome that the PLC was given."""

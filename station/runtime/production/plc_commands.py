@@ -239,7 +239,8 @@ class PlcCommands:
         if not self._stop_wanted:
             return messages.STARTED_MEANWHILE()
         service.stop()
-        if service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
+        await service.end_manual()  # before a HALT, which would stop the jaws that open then
+        if service.stopped_by_person and service.state in {State.IDLE, State.RESETTING, State.HOMING, State.CHECKING}:
             service.runner.post(Event.STOP, operation.STOPPED_AT_PANEL())
         await self._devices.end_recovery()
         reached = await service.runner.until(lambda state: state in WAITING or not service.stopped_by_person)

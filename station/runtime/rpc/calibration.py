@@ -30,6 +30,8 @@ from station.channel.panel_maintenance_queries import (
 from station.channel.server import Handlers
 from station.channel.worker import PanelWorker
 from station.errors import BadInputError, StationError
+from station.inspection.cycle import STOPPED_FOR_A_PERSON
+from station.inspection.states import STATES, State
 from station.messages import calibration as messages
 from station.messages.maintenance import UNDER_WAY
 from station.messages.message import Message, joined, message_of
@@ -43,6 +45,8 @@ from station.settings.recipe import Recipe, find_recipe
 
 ANSWERED_S = 600.0
 """Longest wait for a person to lay the ball."""
+_MOVES_IN = {State.IDLE, State.STOPPED}
+"""States of the cycle in which a run may move something; in any other one something has happened since it began."""
 _PICTURES = ("area.png", "field.png")
 _NAMES = {"calibration": messages.A_CALIBRATION, "verification": messages.A_VERIFICATION}
 
@@ -59,6 +63,7 @@ class _Run:
     result: Message | None = None
     laid: asyncio.Event = field(default_factory=asyncio.Event)
     task: asyncio.Task[None] | None = None
+    cancelled: bool = False
 
     @property
     def open(self) -> bool:
@@ -95,9 +100,12 @@ class PanelCalibration:
 
     async def close(self) -> None:
         """Cancel the run under way; the jaws open. Idempotent."""
-        if self._run is not None and self._run.task is not None:
-            self._run.task.cancel()
-            await asyncio.gather(self._run.task, return_exceptions=True)
+        run = self._run
+        if run is not None and run.task is not None:
+            if not run.cancelled:  # a second one would stop the jaws that open
+                run.cancelled = True
+                run.task.cancel()
+            await asyncio.gather(run.task, return_exceptions=True)
 
     async def state(self, _request: GetCalibration) -> CalibrationState:
         """Return the sensor's calibration state."""
@@ -131,7 +139,7 @@ class PanelCalibration:
         run = self._run = _Run(request.kind, request.actor)
         self._note(request.actor, "calibration.begun")
         undisturbed = contextlib.ExitStack()
-        undisturbed.enter_context(self._service.manual(_NAMES[request.kind]()))
+        undisturbed.enter_context(self._service.manual(_NAMES[request.kind](), self.close))
         self._devices.use(by_inspection=True)
         undisturbed.callback(lambda: self._devices.use(by_inspection=False))
         run.task = asyncio.create_task(self._run_procedure(run, request), name=f"{request.kind} at the panel")
@@ -143,6 +151,8 @@ class PanelCalibration:
         run = self._run
         if run is None or run.state != "waiting":
             raise BadInputError(messages.NOT_WAITING())
+        if why := self._motion_refusal():
+            raise StationError(why)
         run.state, run.request = "running", None
         run.laid.set()
         return _run_view(run)
@@ -162,7 +172,17 @@ class PanelCalibration:
             return UNDER_WAY(activity=activity)
         if not serial:
             return messages.NO_SENSOR()
-        return self._refusal()
+        return self._refusal() or self._motion_refusal()
+
+    def _motion_refusal(self) -> Message | None:
+        """Return why a run may move nothing now but jaws that open."""
+        state = self._service.state
+        return None if state in _MOVES_IN else STATES[state].activity
+
+    def _opening_refusal(self) -> Message | None:
+        """Return why not even the jaws may open now."""
+        state = self._service.state
+        return STATES[state].activity if state in STOPPED_FOR_A_PERSON else None
 
     async def _run_procedure(self, run: _Run, request: StartCalibrationRun) -> None:
         try:
@@ -180,8 +200,14 @@ class PanelCalibration:
             run.request = None
 
     def _rig(self, run: _Run, recipe: Recipe) -> CalibrationRig:
-        patience = self._site.service.patience
-        return CalibrationRig(self._devices.cell, recipe, lambda place: self._lay(run, place), patience)
+        return CalibrationRig(
+            self._devices.cell,
+            recipe,
+            lambda place: self._lay(run, place),
+            self._site.service.patience,
+            self._motion_refusal,
+            self._opening_refusal,
+        )
 
     async def _calibrate(self, run: _Run, request: StartCalibrationRun) -> None:
         recipe = await self._worker.do(lambda: find_recipe(self._site.calibration.recipe, self._site.recipes_folder))

@@ -158,7 +158,7 @@ class PanelMaintenance:
             if self._moving.locked():
                 raise NotNowError(messages.JOG_MOVING())
             async with self._moving:
-                with self._service.manual(JOGGING()):
+                with self._service.manual(JOGGING(), self._devices.halt):
                     wide_mm = gripper.max_width_mm if width_mm is None else width_mm
                     reading = (await gripper.move_to_width(wide_mm, JOG_SPEED_MM_S, JOG_FORCE_N)).reading
         self._devices.monitors[GRIPPER].report_success()

@@ -8,10 +8,14 @@ import pytest
 from station.channel.line import CommandName
 from station.channel.panel_live import GetPanelState, OperatorCommandName, PanelState
 from station.channel.panel_maintenance_queries import CalibrationState, GetCalibration, Jogged, JogGripper
+from station.devices.gripper.errors import GripperStoppedError
+from station.errors import StationError
 from station.inspection.states import State
 from station.messages.calibration import A_CALIBRATION, STEP_PRESS
 from station.messages.commands import JOGGING
+from station.messages.gripper import REMEDY_STOPPED, STOPPED
 from station.messages.maintenance import UNDER_WAY
+from station.press.reference import are_open
 from station.runtime.devices.manager import CAMERA, GRIPPER
 from station.runtime.production.plc_commands import MANUAL
 from station.state_files import StateFiles
@@ -137,5 +141,68 @@ def test_a_reset_that_waited_for_the_disk_while_a_run_began_moves_nothing(at_bal
             await cell.station.service.runner.taken()
             assert entered == [State.STOPPED]
             await end_run(panel)
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(500)
+def test_a_protective_stop_ends_a_press_where_the_jaws_are(at_ball):
+    async def scenario():
+        async with at_ball(bench=False) as (cell, panel, entered):
+            await start_run(panel)
+
+            async def pressed_twice():
+                return any(step.title == STEP_PRESS() and step.number > 1 for step in (await run_now(panel)).steps)
+
+            await cell.until(pressed_twice)
+            cell.twin.boards["arm"].set("protective_stop")
+            await cell.until(lambda: cell.phase is State.LATCHED)
+            await cell.station.service.runner.taken()
+            stopped_mm = cell.twin.world.opening_mm()
+
+            async def over():
+                return (await run_now(panel)).state != "running"
+
+            await cell.until(over)
+            assert (await run_now(panel)).state == "failed"
+            assert cell.twin.world.opening_mm() == stopped_mm
+            assert entered[-1] is State.LATCHED
+            assert cell.station.service.manual_activity is None, "a person may confirm the stop"
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(500)
+def test_a_persons_stop_calls_a_run_off_and_is_done_once_the_jaws_are_open(at_ball):
+    async def scenario():
+        async with at_ball() as (cell, panel, entered):
+            await start_run(panel)
+
+            async def pressed():
+                return any(step.title == STEP_PRESS() for step in (await run_now(panel)).steps)
+
+            await cell.until(pressed)
+            await stop(panel)
+            assert (await run_now(panel)).state == "ended"
+            gripper = cell.station.service._devices.cell.gripper
+            assert are_open((await gripper.read()).width_mm, gripper.max_width_mm)
+            assert entered == [State.STOPPED]
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_a_persons_stop_ends_a_jog(at_ball):
+    async def scenario():
+        async with at_ball() as (cell, panel, _):
+            service = cell.station.service
+            cell.twin.boards["gripper"].set("stuck")
+            jog = JogGripper(to="width", width_mm=40.0, actor=MAX)
+            jogging = asyncio.create_task(panel.request(jog, Jogged, deadline_s=60))
+            await cell.until(lambda: service.manual_activity == JOGGING())
+            await stop(panel)
+            with pytest.raises(StationError) as ended:
+                await jogging
+            assert ended.value.message == GripperStoppedError(STOPPED(), REMEDY_STOPPED()).message
 
     asyncio.run(scenario())

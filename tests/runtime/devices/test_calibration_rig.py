@@ -1,0 +1,138 @@
+"""What a calibration at the panel may move: nothing from the moment at which the cycle is stopped on."""
+
+import asyncio
+import time
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from station.channel.panel_maintenance_queries import ContinueCalibrationRun, StartCalibrationRun
+from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
+from station.errors import StationError
+from station.inspection.states import STATES, State
+from station.press.rig import GripError
+from station.runtime.devices.rig import Cell
+from station.runtime.rpc.calibration import PanelCalibration, _Run
+from station.settings.recipe import find_recipe
+from tests.runtime.ball import MAX
+
+OPEN_MM = 53.0
+PRESSED_MM = 40.0
+
+
+class Devices:
+    """A gripper and an arm in one, which note what they are asked to do."""
+
+    max_width_mm = OPEN_MM
+
+    def __init__(self) -> None:
+        self.moves: list[str] = []
+
+    def _at(self, width_mm: float) -> MoveResult:
+        reading = GripperReading(width_mm, 0, ObjectState.AT_POSITION, True, 0, None, time.monotonic())
+        return MoveResult(width_mm, reading)
+
+    async def activate(self) -> None:
+        self.moves.append("activate")
+
+    async def open(self, width_mm: float | None = None) -> MoveResult:
+        self.moves.append("open")
+        return self._at(OPEN_MM if width_mm is None else width_mm)
+
+    async def move_to_width(self, width_mm: float, _speed_mm_s: float, _force_n: float) -> MoveResult:
+        self.moves.append("close")
+        return self._at(width_mm)
+
+    async def move_to(self, pose: str) -> None:
+        self.moves.append(pose)
+
+
+class Panel:
+    """A panel's calibration over a cycle whose state is set by hand."""
+
+    def __init__(self, home: Any) -> None:
+        self.devices, self.service = Devices(), SimpleNamespace(state=State.IDLE, manual_activity=None)
+        camera: Any = SimpleNamespace(description=SimpleNamespace(serial="D1"))
+        gripper_and_arm: Any = self.devices
+        cell = Cell(camera, gripper_and_arm, gripper_and_arm)
+        site: Any = SimpleNamespace(home=home, service=SimpleNamespace(patience=1.0))
+        production: Any = SimpleNamespace(service=self.service, devices=SimpleNamespace(cell=cell))
+        unused: Any = None
+        self.calibration = PanelCalibration(site, production, unused, unused, unused, lambda: None)
+        self.run = _Run("calibration", MAX)
+        self.rig = self.calibration._rig(self.run, find_recipe("rubber_ball"))
+
+
+@pytest.fixture
+def panel(tmp_path):
+    return Panel(tmp_path)
+
+
+@pytest.mark.parametrize("state", [State.IDLE, State.STOPPED])
+def test_where_the_cycle_waits_a_run_moves_all(panel, state):
+    async def scenario():
+        panel.service.state = state
+        await panel.rig.make_ready()
+        await panel.rig.close_to(PRESSED_MM)
+        await panel.rig.release()
+
+    asyncio.run(scenario())
+    assert panel.devices.moves == ["activate", "close", "open", "above_nest", "home"]
+
+
+@pytest.mark.parametrize(
+    ("state", "moves"),
+    [(State.HELD, ["open"]), (State.LATCHED, []), (State.RECORDING_LATCHED, []), (State.RECOVERING, [])],
+)
+def test_where_the_cycle_was_stopped_a_run_moves_nothing_but_jaws_that_may_open(panel, state, moves):
+    async def scenario():
+        panel.service.state = state
+        for motion in (
+            panel.rig.make_ready(),
+            panel.rig.close_to(PRESSED_MM),
+            panel.rig.enter_nest(),
+            panel.rig.leave_nest(),
+        ):
+            with pytest.raises(GripError) as refused:
+                await motion
+            assert refused.value.message == STATES[state].activity
+        with pytest.raises(GripError):
+            await panel.rig.release()
+
+    asyncio.run(scenario())
+    assert panel.devices.moves == moves
+
+
+def test_an_arm_that_is_stopped_on_its_way_does_not_begin_the_next_part(panel, monkeypatch):
+    async def stopped(pose):
+        panel.devices.moves.append(pose)
+        panel.service.state = State.LATCHED
+
+    monkeypatch.setattr(panel.devices, "move_to", stopped)
+    with pytest.raises(GripError):
+        asyncio.run(panel.rig.leave_nest())
+    assert panel.devices.moves == ["above_nest"]
+
+
+def test_a_run_that_waits_for_the_ball_does_not_go_on_in_a_stop(panel):
+    async def scenario():
+        panel.run.state, panel.calibration._run = "waiting", panel.run
+        panel.service.state = State.LATCHED
+        with pytest.raises(StationError) as refused:
+            await panel.calibration.go_on(ContinueCalibrationRun(actor=MAX))
+        assert refused.value.message == STATES[State.LATCHED].activity
+        assert panel.run.state == "waiting"
+        panel.service.state = State.STOPPED
+        await panel.calibration.go_on(ContinueCalibrationRun(actor=MAX))
+        assert panel.run.laid.is_set()
+
+    asyncio.run(scenario())
+
+
+def test_no_run_begins_while_a_judged_fruit_may_be_between_the_jaws(panel):
+    panel.service.state = State.CARRIED
+    with pytest.raises(StationError) as refused:
+        asyncio.run(panel.calibration.begin(StartCalibrationRun(kind="calibration", actor=MAX)))
+    assert refused.value.message == STATES[State.CARRIED].activity
+    assert panel.calibration._run is None
