@@ -21,6 +21,8 @@ from station.vocabulary import Flag
 
 _SATURATED_LEVEL = 250
 _OPEN_WITHIN_MM = 2.0
+"""How far short of their width jaws still count as open, mm. Estimate: a few times the 2 counts of 0.4 mm within which
+the gripper counts as at its place, and less than the jaws are opened beside a fruit."""
 
 ALARMS = (AlarmId.CAMERA_SATURATED, AlarmId.CAMERA_DIRTY, AlarmId.CAMERA_LED_DEAD, AlarmId.REFERENCE_BAD)
 """Alarms that a refused reference raises."""
@@ -35,7 +37,7 @@ class JawsNotOpenError(GripError):
 
 
 def are_open(width_mm: float, widest_mm: float) -> bool:
-    """Whether a measured width is that of the open jaws."""
+    """Whether a measured width is that of the open jaws, or of jaws that were to open to `widest_mm`."""
     return width_mm >= widest_mm - _OPEN_WITHIN_MM
 
 

@@ -70,7 +70,7 @@ class GripperStoppedError(GripperError):
 
 
 class GripperTimeoutError(GripperError):
-    """The gripper answers, but did not finish in time."""
+    """The gripper answers, but did not finish, or not in time."""
 
     code = "timeout"
 

@@ -27,7 +27,7 @@ from station.records.model import Image
 from station.runtime.alarms.manager import AlarmManager
 from station.runtime.cycle.inspection import Inspection
 from station.runtime.devices.manager import CAMERA, GRIPPER, DeviceManager
-from station.runtime.devices.rig import FRAME_DEADLINE_S, DeviceRig, at_once
+from station.runtime.devices.rig import FRAME_DEADLINE_S, DeviceRig, at_once, open_freely
 from station.runtime.imaging.worker import VisionWorker
 from station.runtime.observability.metrics import Metrics
 from station.settings.configuration import Configuration
@@ -62,7 +62,7 @@ class Inspector:
 
     async def open_jaws(self) -> Event:
         """Let go of whatever is held."""
-        await self._devices.cell.gripper.open()
+        await open_freely(self._devices.cell.gripper)
         return Event.JAWS_OPEN
 
     async def free_fruit(self, now: Inspection) -> Event:
@@ -70,7 +70,7 @@ class Inspector:
         gripper = self._devices.cell.gripper
         if now.met_mm is None:
             raise RuntimeError("a fruit is freed that was not met")
-        await gripper.open(min(now.met_mm + FREED_BY_MM, gripper.max_width_mm))
+        await open_freely(gripper, min(now.met_mm + FREED_BY_MM, gripper.max_width_mm))
         return Event.JAWS_OPEN
 
     async def go_home(self) -> Event:
@@ -358,7 +358,7 @@ class Inspector:
         until_s = time.monotonic() + _LET_GO_S
         for attempt in itertools.count(1):
             try:
-                await self._devices.cell.gripper.open(width_mm)
+                await open_freely(self._devices.cell.gripper, width_mm)
             except _WIRE_FAULTS:
                 if attempt > 1 and time.monotonic() > until_s:
                     raise

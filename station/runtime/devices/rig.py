@@ -8,11 +8,13 @@ from dataclasses import dataclass
 
 from station.devices.arm.arm import Arm
 from station.devices.camera.interface import Camera, Frame, FrameFault, describe
-from station.devices.gripper.errors import GripperStoppedError
+from station.devices.gripper.errors import GripperStoppedError, GripperTimeoutError
 from station.devices.gripper.interface import Gripper, GripperReading, MoveResult, ObjectState
 from station.errors import StationError
 from station.messages import grip as messages
+from station.messages.gripper import REMEDY_LATE
 from station.messages.message import Definition, Message
+from station.press.reference import are_open
 from station.press.rig import FINEST_STEP_MM, GripError, Position
 from station.settings.arm import PoseName
 from station.settings.recipe import Recipe
@@ -149,7 +151,7 @@ class DeviceRig:
             GripError: the gripper did not open, or the arm did not leave; it names what had failed before, too.
         """
         try:
-            await self._cell.gripper.open()
+            await open_freely(self._cell.gripper)
         except StationError as error:
             raise GripError(
                 _combined(failed, error.message, messages.NOT_OPENED, messages.FAILED_NOT_OPENED)
@@ -159,6 +161,21 @@ class DeviceRig:
         except StationError as error:
             left = _combined(failed, error.message, messages.NOT_LEFT, messages.FAILED_NOT_LEFT)
             raise GripError(left) from error
+
+
+async def open_freely(gripper: Gripper, width_mm: float | None = None) -> MoveResult:
+    """Open fast, fully or to a width, and require that nothing stopped the fingers before: what they hold is not free.
+
+    Raises:
+        GripperTimeoutError: something stopped them.
+        GripperError: as `Gripper.open`.
+    """
+    move = await gripper.open(width_mm)
+    stopped = move.reading.object_state is ObjectState.CONTACT_OPENING
+    if stopped and not are_open(move.width_mm, move.requested_width_mm):
+        not_open = messages.JAWS_NOT_OPEN(width_mm=move.width_mm, open_mm=move.requested_width_mm)
+        raise GripperTimeoutError(not_open, REMEDY_LATE())
+    return move
 
 
 def _position(move: MoveResult) -> Position:

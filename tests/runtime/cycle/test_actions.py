@@ -9,15 +9,20 @@ import numpy as np
 import pytest
 
 from station.devices.camera.interface import Frame
+from station.devices.gripper.errors import GripperTimeoutError
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
-from station.inspection.cycle import Event
+from station.inspection.cycle import PLACING, TABLE, Event
+from station.inspection.states import State
 from station.press.motion import Met
-from station.press.rig import Position
+from station.press.rig import GripError, Position
+from station.runtime.cycle import actions
 from station.runtime.cycle.actions import Inspector
+from station.runtime.cycle.runner import event_of
 from station.settings.recipe import find_recipe
 from station.vocabulary import Reason
 
 OPEN_MM = 53.0
+FREED_MM = 45.0
 
 
 class Jaws:
@@ -104,3 +109,43 @@ def test_the_first_contact_is_measured_while_the_jaws_open():
         assert opened.width_mm == jaws.opened_to_mm[0] == pytest.approx(15.2)
 
     asyncio.run(scenario())
+
+
+@pytest.mark.parametrize("release", ["let go", "open", "free", "rig"])
+@pytest.mark.parametrize(
+    ("width_mm", "state", "freed"),
+    [
+        (30.0, ObjectState.CONTACT_OPENING, False),
+        (FREED_MM - 1.0, ObjectState.CONTACT_OPENING, True),
+        (FREED_MM, ObjectState.AT_POSITION, True),
+    ],
+)
+def test_jaws_that_something_stops_while_they_open_have_not_let_the_fruit_go(
+    monkeypatch, release, width_mm, state, freed
+):
+    monkeypatch.setattr(actions, "_LET_GO_S", 0.0)
+    monkeypatch.setattr(actions, "_LET_GO_AGAIN_S", 0.0)
+    jaws, now = Jaws(width_mm, moves=False, state=state), inspection()
+    jaws.max_width_mm, now.met_mm = FREED_MM, FREED_MM
+    worker = inspector(jaws)
+    releases = {
+        "let go": lambda: worker._let_go(FREED_MM),
+        "open": worker.open_jaws,
+        "free": lambda: worker.free_fruit(now),
+        "rig": lambda: worker._rig(now).release(),
+    }
+    if freed:
+        asyncio.run(releases[release]())
+        return
+    with pytest.raises(GripError if release == "rig" else GripperTimeoutError):
+        asyncio.run(releases[release]())
+    assert len(jaws.opened_to_mm) == (2 if release == "let go" else 1), "to let go is tried again"
+
+
+def test_a_judged_fruit_that_was_not_surely_released_needs_a_person():
+    jaws = Jaws(30.0, moves=False, state=ObjectState.CONTACT_OPENING)
+    with pytest.raises(GripperTimeoutError) as blocked:
+        asyncio.run(inspector(jaws).open_jaws())
+    event = event_of(blocked.value)
+    assert {TABLE[state, event].state for state in PLACING} == {State.CARRIED}
+    assert TABLE[State.RELEASING, event].state is State.HELD
