@@ -140,7 +140,7 @@ class AlarmManager:
             if alarm not in self._device_alarms.values():
                 self.clear(alarm)
         if told is not None and fault is not None:
-            self.raise_(told, message_of(fault))
+            self.update(told, message_of(fault))
 
     def acknowledge(self, alarm: AlarmId) -> bool:
         """Acknowledge an alarm, and return whether that changed anything."""

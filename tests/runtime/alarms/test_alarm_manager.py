@@ -3,11 +3,13 @@
 import pytest
 
 from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.gripper.errors import GripperNotActiveError
 from station.inspection.alarm_table import AlarmId
-from station.messages.message import verbatim
+from station.messages import gripper as gripper_messages
+from station.messages.message import message_of, verbatim
 from station.messages.operation import INTERFACE_SILENT
 from station.runtime.alarms.manager import OF_DEVICE, AlarmManager
-from station.runtime.devices.manager import ARM
+from station.runtime.devices.manager import ARM, GRIPPER
 from station.runtime.observability.metrics import Metrics
 
 
@@ -20,6 +22,19 @@ def test_a_later_finding_is_the_alarms_detail_and_no_second_alarm():
     assert alarm.raised == 1
     manager.update(AlarmId.PLC_INTERFACE_LOST, None)
     assert alarm.id not in [each.id for each in manager.alarms.active]
+
+
+def test_the_detail_of_a_devices_alarm_is_what_a_person_has_to_do_now():
+    manager = AlarmManager(Metrics("0", 1.0))
+    wait = GripperNotActiveError(gripper_messages.NOT_ACTIVE(), gripper_messages.REMEDY_WAIT())
+    empty = GripperNotActiveError(gripper_messages.JAWS_UNKNOWN(), gripper_messages.REMEDY_EMPTY_JAWS())
+    for fault in (wait, empty):
+        manager.set_device_fault(GRIPPER, fault)
+    alarm = manager.alarms.get(AlarmId.GRIPPER_FAULT)
+    assert alarm.detail == message_of(empty)
+    assert alarm.raised == 1
+    manager.set_device_fault(GRIPPER, None)
+    assert not manager.alarms.active
 
 
 OWN_ALARM = {
