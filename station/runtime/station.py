@@ -97,7 +97,7 @@ class Station:
         stack.push_async_callback(self._note_end, audit)
 
         def device_changed(name: str, fault: StationError | None) -> None:
-            alarms.set_device_fault(name, devices.monitors[name].reported_fault)
+            alarms.update_device(devices.monitors[name])
             service.device_changed(fault)
 
         def progress(name: str) -> None:

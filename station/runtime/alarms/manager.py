@@ -24,6 +24,7 @@ from station.records.model import AlarmEntry, StoredAlarm
 from station.records.open import Notice
 from station.records.records import Records
 from station.runtime.devices.manager import ARM, CAMERA, GRIPPER
+from station.runtime.devices.monitor import DeviceMonitor
 from station.runtime.devices.rig import FramesError
 from station.runtime.observability.metrics import Metrics
 
@@ -131,6 +132,11 @@ class AlarmManager:
         """Raise the alarm of lost records by the notices of their opening; it stays until it is acknowledged."""
         for notice in notices:
             self.update(AlarmId.RECORDS_LOST, FAULT(cause=notice.cause, remedy=notice.remedy))
+
+    def update_device(self, monitor: DeviceMonitor) -> None:
+        """Raise or clear a device's alarms by what its monitor found; they stay as they are until that is decided."""
+        if monitor.is_decided:
+            self.set_device_fault(monitor.name, monitor.fault)
 
     def set_device_fault(self, device: str, fault: StationError | None) -> None:
         """Raise the alarm of the fault of the `arm`, `gripper` or `camera`, or clear the alarms of a healthy one."""

@@ -14,6 +14,7 @@ from station.messages.message import Message
 PERIOD_S = 0.25
 FIRST_PAUSE_S = 0.25
 MEETING_S = 15.0
+"""A device's time to become healthy after the start, before an operator sees its fault: an estimate."""
 
 log = logging.getLogger(__name__)
 
@@ -54,9 +55,12 @@ class DeviceMonitor:
         self._began_s = time.monotonic()
 
     @property
-    def reported_fault(self) -> StationError | None:
-        """Return the fault that an operator has to see: a device has some time to answer after the start."""
-        return None if self.heard_s is None and time.monotonic() < self._began_s + MEETING_S else self.fault
+    def is_decided(self) -> bool:
+        """Return whether an operator has to see its fault, or that it has none; until then the alarms stay as they are.
+
+        A device has some time to answer after the start.
+        """
+        return self.heard_s is not None or time.monotonic() >= self._began_s + MEETING_S
 
     @property
     def age_s(self) -> float | None:

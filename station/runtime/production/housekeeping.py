@@ -134,8 +134,8 @@ class Housekeeping:
     def _update_alarms(self) -> None:
         service, alarms = self._service, self._service.alarms
         alarms.tick()
-        for name, watch in self._devices.monitors.items():
-            alarms.set_device_fault(name, watch.reported_fault)
+        for monitor in self._devices.monitors.values():
+            alarms.update_device(monitor)
         fault = service.registry.fault
         alarms.update(AlarmId.RECORDS_NOT_WRITABLE, None if fault is None else message_of(fault))
         free_mb = service.registry.records.status().free_bytes / _MB

@@ -7,12 +7,16 @@ import time
 import pytest
 
 from station.channel.line import CommandName
-from station.devices.gripper.errors import GripperFaultError
+from station.devices.gripper.errors import GripperFaultError, GripperNotActiveError
 from station.inspection.alarm_table import AlarmId
-from station.inspection.alarms import CAUSED
+from station.inspection.alarms import CAUSED, AlarmState
 from station.inspection.states import State
 from station.messages import commands
+from station.records.model import AlarmRow
+from station.records.records import Records
+from station.runtime.devices.manager import GRIPPER
 from station.runtime.production import plc_commands
+from station.runtime.production.housekeeping import Housekeeping
 from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, publish
 from tests.eventually import until
 
@@ -238,5 +242,47 @@ def test_many_fruit_that_cannot_be_judged_are_an_alarm_until_one_can(bench):
             cell.lay("raspberry", 1, bruised=True)
             assert (await cell.line.inspect()).outcome == "FAIL"
             assert not caused(cell, AlarmId.MANY_NO_RESULT)
+
+    asyncio.run(scenario())
+
+
+@pytest.fixture
+def updates(monkeypatch):
+    """Return a note of each update of the alarms by housekeeping."""
+    made, update = [], Housekeeping._update_alarms
+
+    def noted(self):
+        update(self)
+        made.append(self)
+
+    monkeypatch.setattr(Housekeeping, "_update_alarms", noted)
+    return made
+
+
+def stored(monkeypatch, alarm):
+    """Have the records give an acknowledged alarm to the next start."""
+    raised_ms = round(1000 * (time.time() - 60.0))
+
+    async def load_alarms(_):
+        return (AlarmRow(alarm, AlarmState.ACKNOWLEDGED, raised_ms, raised_ms),)
+
+    monkeypatch.setattr(Records, "load_alarms", load_alarms)
+
+
+@pytest.mark.timeout(240)
+def test_an_alarm_of_a_device_that_is_still_faulty_outlives_a_restart_as_it_was(bench, until, updates, monkeypatch):
+    """On a bench the gripper waits for a person's reset, which activates it."""
+    stored(monkeypatch, AlarmId.GRIPPER_FAULT)
+
+    async def scenario():
+        async with bench() as cell:
+            service = cell.station.service
+            monitor = service._devices.monitors[GRIPPER]
+            await until(lambda: isinstance(monitor.fault, GripperNotActiveError) and len(updates) > 2)
+            alarm = service.alarms.alarms.get(AlarmId.GRIPPER_FAULT)
+            assert (alarm.state, alarm.raised) == (AlarmState.ACKNOWLEDGED, 1)
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            await until(lambda: AlarmId.GRIPPER_FAULT not in active(cell))
 
     asyncio.run(scenario())

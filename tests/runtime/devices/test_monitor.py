@@ -1,5 +1,7 @@
 """What a device's monitor reports: each change that means something else to the cycle, once."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from station.devices.arm.faults import ArmCause, ArmFault
@@ -7,8 +9,9 @@ from station.devices.gripper.errors import GripperNotActiveError
 from station.messages import device as messages
 from station.messages.message import verbatim
 from station.runtime.devices import manager
+from station.runtime.devices import monitor as monitor_module
 from station.runtime.devices.manager import DeviceManager
-from station.runtime.devices.monitor import DeviceMonitor
+from station.runtime.devices.monitor import MEETING_S, DeviceMonitor
 from station.runtime.devices.rig import FRAME_DEADLINE_S
 from station.settings.camera import CameraSettings
 from station.settings.configuration import Configuration
@@ -42,3 +45,19 @@ def test_a_check_of_a_camera_that_does_not_open_ends_before_the_station_counts_a
     [settings] = used
     assert settings.open_deadline_s + FRAME_DEADLINE_S < configuration.service.progress_s
     assert settings.open_deadline_s <= deadline_s
+
+
+@pytest.mark.parametrize("answers", [True, False])
+def test_what_an_operator_sees_of_a_device_is_decided_once_it_was_healthy_or_had_its_time_to_answer(
+    monkeypatch, answers
+):
+    now_s = 100.0
+    monkeypatch.setattr(monitor_module, "time", SimpleNamespace(monotonic=lambda: now_s))
+    monitor = DeviceMonitor("arm", messages.ARM(), healthy, 1.0, lambda _: None, lambda: None)
+    monitor.report_fault(ArmFault(ArmCause.STALE, verbatim("1 s")))
+    assert not monitor.is_decided
+    if answers:
+        monitor.report_success()
+    else:
+        now_s += MEETING_S
+    assert monitor.is_decided
