@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import time
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from station.clock import utc_ms
 from station.devices.arm.faults import ArmCause, ArmFault
@@ -137,6 +137,13 @@ class AlarmManager:
         """Raise or clear a device's alarms by what its monitor found; they stay as they are until that is decided."""
         if monitor.is_decided:
             self.set_device_fault(monitor.name, monitor.fault)
+
+    def clear_absent(self, devices: Collection[str]) -> None:
+        """Clear the alarms that none of a station's devices raises: of an arm that was configured away."""
+        watched = {alarm for device in devices for alarm in OF_DEVICE[device]}
+        for alarms in OF_DEVICE.values():
+            for alarm in alarms - watched:
+                self.clear(alarm)
 
     def set_device_fault(self, device: str, fault: StationError | None) -> None:
         """Raise the alarm of the fault of the `arm`, `gripper` or `camera`, or clear the alarms of a healthy one."""

@@ -136,6 +136,7 @@ class Housekeeping:
         alarms.tick()
         for monitor in self._devices.monitors.values():
             alarms.update_device(monitor)
+        alarms.clear_absent(self._devices.monitors)
         fault = service.registry.fault
         alarms.update(AlarmId.RECORDS_NOT_WRITABLE, None if fault is None else message_of(fault))
         free_mb = service.registry.records.status().free_bytes / _MB

@@ -1,5 +1,9 @@
 """The alarm manager: a cause that stays, what is found about it, and the alarm of each fault of the arm."""
 
+import asyncio
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from station.devices.arm.faults import ArmCause, ArmFault
@@ -8,8 +12,9 @@ from station.inspection.alarm_table import AlarmId
 from station.messages import gripper as gripper_messages
 from station.messages.message import message_of, verbatim
 from station.messages.operation import INTERFACE_SILENT
+from station.records.model import AlarmRow
 from station.runtime.alarms.manager import OF_DEVICE, AlarmManager
-from station.runtime.devices.manager import ARM, GRIPPER
+from station.runtime.devices.manager import ARM, CAMERA, GRIPPER
 from station.runtime.observability.metrics import Metrics
 
 
@@ -58,3 +63,21 @@ def test_only_an_arm_that_does_not_answer_has_the_alarm_of_its_network_cable(cau
     manager.set_device_fault(ARM, None)
     manager.reset()
     assert not manager.alarms.active
+
+
+def test_the_alarms_of_an_arm_that_was_configured_away_end_and_those_that_a_gripper_shares_do_not():
+    async def load_alarms():
+        shared = (AlarmId.ARM_LINK_LOST, AlarmId.EMERGENCY_STOP, AlarmId.GRIPPER_FAULT)
+        return tuple(AlarmRow(alarm, "acknowledged", 1, 1) for alarm in shared)
+
+    records: Any = SimpleNamespace(load_alarms=load_alarms, notices=())
+    manager = AlarmManager(Metrics("0", 1.0), to_restore=True)
+    asyncio.run(manager.restore(records))
+    manager.clear_absent({ARM, CAMERA, GRIPPER})
+    assert {alarm.id for alarm in manager.alarms.active} == {
+        AlarmId.ARM_LINK_LOST,
+        AlarmId.EMERGENCY_STOP,
+        AlarmId.GRIPPER_FAULT,
+    }
+    manager.clear_absent({CAMERA, GRIPPER})
+    assert {alarm.id for alarm in manager.alarms.active} == {AlarmId.EMERGENCY_STOP, AlarmId.GRIPPER_FAULT}

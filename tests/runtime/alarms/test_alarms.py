@@ -286,3 +286,14 @@ def test_an_alarm_of_a_device_that_is_still_faulty_outlives_a_restart_as_it_was(
             await until(lambda: AlarmId.GRIPPER_FAULT not in active(cell))
 
     asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_an_alarm_of_an_arm_that_was_configured_away_is_over_after_the_start(bench, until, monkeypatch):
+    stored(monkeypatch, AlarmId.ARM_LINK_LOST)
+
+    async def scenario():
+        async with bench() as cell:
+            await until(lambda: AlarmId.ARM_LINK_LOST not in active(cell))
+
+    asyncio.run(scenario())
