@@ -5,6 +5,7 @@ Registers: Robotiq 2F-85 & 2F-140 instruction manual, chapter 4. Unverified on h
 
 import asyncio
 import logging
+import termios
 from collections.abc import Awaitable, Callable
 from typing import Any, NoReturn
 
@@ -169,7 +170,11 @@ class ModbusRtuLink:
         self._wait_for_quiet = False
         self._lost = asyncio.Event()
         client = self._make()
-        if not await client.connect():
+        try:
+            connected = await client.connect()
+        except termios.error:  # pyserial's, of a port that goes away while it is opened; it is no OSError
+            connected = False
+        if not connected:
             client.close()
             raise GripperUnreachableError(messages.UNREACHABLE(place=self.place), messages.REMEDY_SERIAL())
         self._client = client

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import logging
 import time
 from collections.abc import Callable
 
@@ -29,6 +30,8 @@ from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.monitor import DeviceMonitor
 from station.runtime.devices.rig import FRAME_DEADLINE_S, Cell, FramesError
 from station.settings.configuration import Configuration
+
+log = logging.getLogger(__name__)
 
 CAMERA, GRIPPER, ARM = "camera", "gripper", "arm"
 TITLES = {CAMERA: device_messages.CAMERA(), GRIPPER: device_messages.GRIPPER(), ARM: device_messages.ARM()}
@@ -179,10 +182,13 @@ class DeviceManager:
         """Stop arm and gripper where they are. Never raises: the monitors find a device that does not answer."""
 
         async def quietly(stop: Callable[[], object]) -> None:
-            with contextlib.suppress(StationError, TimeoutError):
-                result = stop()
-                if asyncio.iscoroutine(result):
-                    await result
+            try:
+                with contextlib.suppress(StationError, TimeoutError):
+                    result = stop()
+                    if asyncio.iscoroutine(result):
+                        await result
+            except Exception:  # a bug in one driver must neither keep the other device moving nor end the cycle
+                log.exception("a device was not stopped")
 
         await asyncio.gather(
             quietly(self.cell.gripper.stop), quietly(self._arm.stop if self._arm is not None else lambda: None)

@@ -10,6 +10,7 @@ from station.devices.arm.faults import ArmFault
 from station.errors import StationError
 from station.messages import device as messages
 from station.messages.message import Message
+from station.messages.operation import INTERNAL_FAULT
 
 PERIOD_S = 0.25
 FIRST_PAUSE_S = 0.25
@@ -19,7 +20,7 @@ MEETING_S = 15.0
 log = logging.getLogger(__name__)
 
 Check = Callable[[], Awaitable[None]]
-"""Checks the device; raises its fault. It returns in time, whatever the device does."""
+"""Checks the device; raises its fault. It returns in time, whatever the device does. Any other error is a fault too."""
 
 
 class NoAnswerYetError(StationError):
@@ -94,9 +95,9 @@ class DeviceMonitor:
             else:
                 try:
                     await self._check()
-                except StationError as fault:
+                except Exception as error:  # noqa: BLE001 (whatever it is, the device is checked again)
                     pause_s = FIRST_PAUSE_S if self.fault is None else min(2 * pause_s, self._longest_pause_s)
-                    self._set(fault)
+                    self._set(_fault_of(error))
                     self._on_progress()
                 else:
                     pause_s = PERIOD_S
@@ -121,6 +122,14 @@ class DeviceMonitor:
             log.log(logging.WARNING if fault else logging.INFO, "%s: %s", self.name, fault.message if fault else "well")
         if _kind(before) != _kind(fault):
             self._on_change(fault)
+
+
+def _fault_of(error: Exception) -> StationError:
+    """A check's error as the device's fault; one that no driver should raise is logged with its traceback."""
+    if isinstance(error, StationError):
+        return error
+    log.error("an unexpected error in the check of a device", exc_info=error)
+    return StationError(INTERNAL_FAULT(words=f"{type(error).__name__}: {error}"))
 
 
 def _kind(fault: StationError | None) -> object:

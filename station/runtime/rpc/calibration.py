@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -35,6 +36,7 @@ from station.inspection.states import STATES, State
 from station.messages import calibration as messages
 from station.messages.maintenance import UNDER_WAY
 from station.messages.message import Message, joined, message_of
+from station.messages.operation import INTERNAL_FAULT
 from station.records.audit import AuditEntry, append_audit
 from station.records.records import Records
 from station.runtime.devices.calibration_rig import CalibrationRig
@@ -42,6 +44,8 @@ from station.runtime.observability.audit_logger import AuditLogger, calibration_
 from station.runtime.production.production import Production
 from station.settings.configuration import Configuration
 from station.settings.recipe import Recipe, find_recipe
+
+log = logging.getLogger(__name__)
 
 ANSWERED_S = 600.0
 """Longest wait for a person to lay the ball."""
@@ -194,6 +198,9 @@ class PanelCalibration:
             run.state, run.result = "failed", message_of(error)
             if isinstance(error, StationError):
                 self._devices.report_fault(error)
+        except Exception as error:  # the page must not show for ever that it runs
+            log.exception("the %s at the panel", run.kind)
+            run.state, run.result = "failed", INTERNAL_FAULT(words=f"{type(error).__name__}: {error}")
         else:
             run.state, run.result = ("passed", None) if result is None else ("failed", result)
         finally:

@@ -5,6 +5,7 @@ import contextlib
 import socket
 import subprocess
 import sys
+import termios
 import time
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -27,6 +28,7 @@ from station.devices.gripper.errors import (
     GripperUnreachableError,
 )
 from station.devices.gripper.interface import ObjectState
+from station.devices.gripper.modbus_rtu import ModbusRtuLink
 from station.devices.gripper.robotiq import make_gripper
 from station.devices.gripper.urcap import UrcapLink
 from station.messages import gripper as messages
@@ -420,3 +422,18 @@ def test_devices_check_of_a_dead_gripper_prints_the_stations_own_line_alone(tmp_
     assert "Modbus RTU unit 9" in done.stdout
     [line] = done.stderr.splitlines()
     assert "not usable" in line
+
+
+def test_a_serial_port_that_goes_away_while_it_is_opened_is_out_of_reach(monkeypatch: pytest.MonkeyPatch):
+    """pyserial flushes what it has just opened, and hands the error of the system call on as it is."""
+    closed = list[str]()
+
+    async def connect() -> bool:
+        raise termios.error(5, "Input/output error")
+
+    client = SimpleNamespace(connect=connect, close=lambda: closed.append("client"))
+    monkeypatch.setattr(ModbusRtuLink, "_make", lambda _: client)
+    link = ModbusRtuLink(ModbusRtuSettings(line="serial", serial_port="/dev/ttyUSB0"), 0.1)
+    with pytest.raises(GripperUnreachableError):
+        asyncio.run(link.status())
+    assert closed == ["client"]

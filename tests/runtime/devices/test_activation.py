@@ -248,3 +248,18 @@ def test_the_end_of_a_recovery_stops_the_gripper_and_waits_for_fingers_that_trav
         assert ended == ["recovery", "activation", "recovery"]
 
     asyncio.run(scenario())
+
+
+def test_a_bug_in_one_device_keeps_neither_the_other_moving_nor_the_halt_from_its_end(bench, monkeypatch):
+    stopped = []
+
+    async def fails():
+        raise RuntimeError("a bug")
+
+    async def stop():
+        stopped.append("arm")
+
+    monkeypatch.setattr(bench.gripper, "stop", fails, raising=False)
+    monkeypatch.setattr(bench.arm, "stop", stop, raising=False)
+    asyncio.run(bench.devices.halt())
+    assert stopped == ["arm"]

@@ -11,6 +11,7 @@ from station.channel.panel_maintenance_queries import ContinueCalibrationRun, St
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
 from station.errors import StationError
 from station.inspection.states import STATES, State
+from station.messages.operation import INTERNAL_FAULT
 from station.press.rig import GripError
 from station.runtime.devices.rig import Cell
 from station.runtime.rpc.calibration import PanelCalibration, _Run
@@ -136,3 +137,12 @@ def test_no_run_begins_while_a_judged_fruit_may_be_between_the_jaws(panel):
         asyncio.run(panel.calibration.begin(StartCalibrationRun(kind="calibration", actor=MAX)))
     assert refused.value.message == STATES[State.CARRIED].activity
     assert panel.calibration._run is None
+
+
+def test_a_run_that_a_bug_ends_has_failed(panel, monkeypatch):
+    async def fails(_run, _request):
+        raise RuntimeError("a bug")
+
+    monkeypatch.setattr(panel.calibration, "_calibrate", fails)
+    asyncio.run(panel.calibration._run_procedure(panel.run, StartCalibrationRun(kind="calibration", actor=MAX)))
+    assert (panel.run.state, panel.run.result) == ("failed", INTERNAL_FAULT(words="RuntimeError: a bug"))

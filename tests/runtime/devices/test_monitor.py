@@ -1,5 +1,6 @@
 """What a device's monitor reports: each change that means something else to the cycle, once."""
 
+import asyncio
 from types import SimpleNamespace
 
 import pytest
@@ -8,6 +9,7 @@ from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.gripper.errors import GripperNotActiveError
 from station.messages import device as messages
 from station.messages.message import verbatim
+from station.messages.operation import INTERNAL_FAULT
 from station.runtime.devices import manager
 from station.runtime.devices import monitor as monitor_module
 from station.runtime.devices.manager import DeviceManager
@@ -61,3 +63,30 @@ def test_what_an_operator_sees_of_a_device_is_decided_once_it_was_healthy_or_had
     else:
         now_s += MEETING_S
     assert monitor.is_decided
+
+
+def test_an_error_that_no_driver_should_raise_is_a_fault_until_the_next_check_finds_none(monkeypatch):
+    monkeypatch.setattr(monitor_module, "PERIOD_S", 0.01)
+    errors, reported = [RuntimeError("a bug")], []
+
+    async def check():
+        if errors:
+            raise errors.pop()
+
+    async def scenario():
+        well = asyncio.Event()
+
+        def changed(fault):
+            reported.append(fault and fault.message)
+            if fault is None:
+                well.set()
+
+        monitor = DeviceMonitor("gripper", messages.GRIPPER(), check, 1.0, changed, lambda: None)
+        checking = asyncio.create_task(monitor.run())
+        async with asyncio.timeout(10):
+            await well.wait()
+        checking.cancel()
+        await asyncio.gather(checking, return_exceptions=True)
+
+    asyncio.run(scenario())
+    assert reported == [INTERNAL_FAULT(words="RuntimeError: a bug"), None]
