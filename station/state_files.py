@@ -24,6 +24,16 @@ class StateFiles:
             log.warning("%s cannot be read: %s", self.folder / name, error.strerror)
             return None
 
+    def is_missing(self, name: str) -> bool:
+        """Return whether a file is surely not in the folder: one that cannot be read may say anything."""
+        try:
+            (self.folder / name).lstat()
+        except FileNotFoundError:
+            return True
+        except OSError:
+            return False
+        return False
+
     def write(self, name: str, data: bytes) -> bool:
         """Replace a file in the folder atomically, unless it has this content; return whether it has it now."""
         path = self.folder / name

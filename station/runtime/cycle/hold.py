@@ -22,9 +22,8 @@ class Hold:
         self._files, self._carries = state_files, carries
         self._turn = asyncio.Lock()
         self._late: set[asyncio.Task[None]] = set()
-        data = state_files.read(FILE_NAME)
-        missing = data is None and not (state_files.folder / FILE_NAME).exists()
-        self.event = None if missing or data == _NONE else _HOLDS.get(data or b"", Event.FRUIT_HELD)
+        data = _NONE if state_files.is_missing(FILE_NAME) else state_files.read(FILE_NAME)
+        self.event = None if data == _NONE else _HOLDS.get(data or b"", Event.FRUIT_HELD)
         """None where no person is needed."""
 
     def changes(self, event: Event, state: State) -> bool:

@@ -83,13 +83,16 @@ class PlcCommands:
         self.registers_wanted = True
 
     def restore(self) -> None:
-        """Restore after a restart a person's stop, which lasts until a reset, and the mode."""
-        if self._state_files.read(_STOPPED) == b"yes":
+        """Restore after a restart a person's stop, which lasts until a reset, and the mode.
+
+        Somebody may reach into the cell of a station whose files say neither the one nor the other, or cannot be read.
+        """
+        files = self._state_files
+        if not (files.is_missing(_STOPPED) or files.read(_STOPPED) == b"no"):
             self._stop_wanted = True
             self._service.stop()
-        stored = self._state_files.read(_MODE)
-        if stored is not None:
-            # Somebody may reach into the cell of a station whose file says neither the one nor the other.
+        if not files.is_missing(_MODE):
+            stored = files.read(_MODE)
             self.mode = next((mode for mode in MODES if stored == b"%d" % mode), MANUAL)
             self._service.set_mode(production=self.mode == PRODUCTION)
 

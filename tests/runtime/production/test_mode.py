@@ -2,6 +2,8 @@
 
 import asyncio
 import threading
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -12,7 +14,7 @@ from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import GRIPPER
 from station.runtime.production import plc_commands
 from station.runtime.production.housekeeping import Housekeeping
-from station.runtime.production.plc_commands import MANUAL, PRODUCTION
+from station.runtime.production.plc_commands import MANUAL, PRODUCTION, PlcCommands
 from station.state_files import StateFiles
 
 
@@ -120,3 +122,26 @@ def test_a_mode_that_cannot_be_stored_is_set_and_said(bench, monkeypatch):
             assert (await cell.line.state()).mode == MANUAL
 
     asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(
+    ("stop", "stopped"),
+    [(None, False), (b"no", False), (b"yes", True), (b"", True), (b"\0\0\0", True), ("a folder", True)],
+)
+@pytest.mark.parametrize("mode", [None, "a folder"])
+def test_files_of_stop_and_mode_that_cannot_be_read_stop_the_station_in_manual_mode(tmp_path, stop, stopped, mode):
+    for name, content in {"stopped_by_a_person": stop, "mode": mode}.items():
+        if content == "a folder":
+            (tmp_path / name).mkdir()
+        elif content is not None:
+            (tmp_path / name).write_bytes(content)
+    stops, productions = list[str](), list[bool]()
+    service: Any = SimpleNamespace(
+        stop=lambda: stops.append("stop"), set_mode=lambda *, production: productions.append(production)
+    )
+    seen: Any = SimpleNamespace(metrics=None, audit=None)
+    none: Any = None
+    orders = PlcCommands(service, none, none, none, StateFiles(tmp_path), seen)
+    orders.restore()
+    assert bool(stops) == stopped
+    assert (orders.mode, productions) == ((PRODUCTION, []) if mode is None else (MANUAL, [False]))
