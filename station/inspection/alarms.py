@@ -166,8 +166,10 @@ class Alarms:
         return alarms
 
     def reset(self, alarm: AlarmId) -> Self:
-        """A person lets go a latched one whose cause is gone."""
-        return self._after(alarm, E.RESET)
+        """A person lets go a latched one whose cause is gone, also one that chattered until just now."""
+        was = self.get(alarm)
+        is_gone = ALARMS[alarm].latched and was.quiet_since_s is not None
+        return self._with(_moved(_returned_for_good(was) if is_gone else was, E.RESET))
 
     def shelve(self, alarm: AlarmId, now_s: float, for_s: float, by: str) -> Self:
         """Hide it for a time from now (UTC), `LONGEST_SHELVED_S` at most; a latched one is never hidden."""
@@ -244,8 +246,13 @@ def _ticked(alarm: Alarm, now_s: float) -> Alarm:
     if alarm.shelved_until_s is not None and not 0 <= alarm.shelved_until_s - now_s <= LONGEST_SHELVED_S:
         alarm = _moved(alarm, E.UNSHELVED)
     if alarm.quiet_since_s is not None and not 0 <= now_s - alarm.quiet_since_s < CHATTER_S:
-        alarm = _moved(replace(alarm, quiet_since_s=None, raises_s=()), E.RETURNED)
+        alarm = _returned_for_good(alarm)
     return alarm
+
+
+def _returned_for_good(alarm: Alarm) -> Alarm:
+    """A chattering alarm whose cause is gone for good."""
+    return _moved(replace(alarm, quiet_since_s=None, raises_s=()), E.RETURNED)
 
 
 _ROW = TypeAdapter(Alarm)

@@ -106,6 +106,23 @@ def test_a_chattering_alarm_is_told_once_and_counted():
     assert alarms.tick(9.5 + CHATTER_S).get(LOW).state == AlarmState.NORMAL
 
 
+def test_a_reset_ends_a_stop_that_chattered_once_its_cause_is_gone():
+    alarms = Alarms()
+    for second in range(5):
+        alarms = alarms.raise_(STOP, second, None)
+        assert alarms.reset(STOP).get(STOP).state == AlarmState.UNACKNOWLEDGED, "its cause is there"
+        alarms = alarms.returned(STOP, second + 0.5)
+    assert alarms.get(STOP).state == AlarmState.UNACKNOWLEDGED, "it chatters"
+    alarms = alarms.reset(STOP)
+    assert alarms.get(STOP).state == AlarmState.NORMAL
+    for second in range(5, 75):
+        alarms = alarms.tick(second)
+        assert alarms.get(STOP).state == AlarmState.NORMAL
+    alarms = alarms.raise_(STOP, 75.0, None)
+    assert alarms.get(STOP).state == AlarmState.UNACKNOWLEDGED
+    assert alarms.returned(STOP, 76.0).get(STOP).state == AlarmState.LATCHED_UNACKNOWLEDGED
+
+
 def test_the_most_urgent_comes_first_then_the_oldest():
     alarms = Alarms()
     for second, alarm in enumerate((LOW, AlarmId.CAMERA_LOST, AlarmId.ARM_LINK_LOST, STOP)):
