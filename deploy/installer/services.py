@@ -10,7 +10,7 @@ from installer.layout import NAME, TIMER, UNIT, Layout
 from installer.messages import Failed, print_progress
 from installer.programs import run
 
-_START_LIMIT_S, _STOP_LIMIT_S = 4200.0, 200.0
+_START_LIMIT_S, _STOP_LIMIT_S = 4200.0, 260.0
 """Longer than the unit's own limits, which end it: a start that migrates the records of years extends its limit, by an
 hour at most."""
 

@@ -81,7 +81,8 @@ def demo(
     new = calibrate_simulated_unit(site, "demo")
     if new is not None:
         click.echo(f"calibrated the simulated sensor by its drawn ball at three places: {new.summary()}")
-    supervisor = Supervisor([twin_program(None, console, seed, _logs(site)), *station_programs(None, _logs(site))])
+    station = station_programs(None, _logs(site), clean_up_s=site.service.clean_up_deadline_s)
+    supervisor = Supervisor([twin_program(None, console, seed, _logs(site)), *station])
     asyncio.run(_run(site, supervisor, nest, LineProgram(plan, _LOT), pace, count))
 
 

@@ -40,7 +40,8 @@ async def _supervise(site: Configuration, config: Path | None) -> None:
         notify("READY=1")
 
     outbox = site.outbox.postgresql.enabled or site.outbox.mqtt.enabled
-    await Supervisor(station_programs(config, outbox=outbox)).run(announce, ended)
+    programs = station_programs(config, outbox=outbox, clean_up_s=site.service.clean_up_deadline_s)
+    await Supervisor(programs).run(announce, ended)
 
 
 def addresses(site: Configuration) -> str:

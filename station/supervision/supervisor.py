@@ -52,6 +52,8 @@ class Program:
     """From SIGTERM to SIGKILL."""
     output: Path | None = None
     """File for its output and messages; None for the supervisor's own output."""
+    outlives: str | None = None
+    """Name of a program before it that ends before it all the same; None for one that ends before all before it."""
 
 
 class _Child:
@@ -150,7 +152,7 @@ class _Child:
 
 
 class Supervisor:
-    """Supervisor of programs, each started when the one before is ready, and ended in reverse."""
+    """Supervisor of programs, each started when the one before is ready, and ended in reverse but for `outlives`."""
 
     def __init__(self, programs: Sequence[Program], environment: Mapping[str, str] | None = None) -> None:
         self._programs = programs
@@ -247,7 +249,13 @@ class Supervisor:
         publish(self._restarts_file, counts)
 
     async def _stop(self) -> None:
-        for child in reversed(self._children):
+        names = [child.program.name for child in self._children]
+
+        def rank(child: _Child) -> float:
+            outlived = child.program.outlives
+            return names.index(outlived) - 0.5 if outlived in names else names.index(child.program.name)
+
+        for child in sorted(self._children, key=rank, reverse=True):
             await child.stop(child.program.stop_limit_s)
             child.close()
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from station.settings.service import ServiceSettings
 from station.supervision import notify
 from station.supervision.programs import station_programs
 from tests.tools import optional
@@ -78,7 +79,9 @@ def test_what_a_unit_may_is_little(root, name):
 
 def test_the_units_times_leave_room_for_what_the_supervisor_mends_itself(root):
     service = unit(root, "fruit-station.service")["Service"]
-    programs = station_programs(None, outbox=True)
+    limits = ServiceSettings.model_fields["clean_up_deadline_s"].metadata
+    longest_s = next(limit.le for limit in limits if hasattr(limit, "le"))
+    programs = station_programs(None, outbox=True, clean_up_s=longest_s)
     slowest_start_s = max(each.start_limit_s for each in programs)
     assert service["Type"] == ["notify"]
     assert seconds(service["WatchdogSec"][0]) > max(each.watchdog_s for each in programs) + 2 * slowest_start_s

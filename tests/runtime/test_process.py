@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import json
 import signal
 import subprocess
 import sys
@@ -9,6 +10,8 @@ import time
 
 import pytest
 
+from plc_interface.client import StationClient
+from plc_interface.registers.map import BY_NAME
 from station.channel.client import ChannelClient
 from station.channel.line import CommandName, PackmlState
 from station.channel.panel import Actor
@@ -25,6 +28,7 @@ from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
 from station.twin.console import ask
 from station.vocabulary import Reason
+from tests.ports import free_port
 
 
 @pytest.fixture
@@ -272,3 +276,37 @@ def test_after_an_emergency_stop_a_person_is_offered_only_what_can_work(cell):
             await line.ready()
 
     asyncio.run(scenario())
+
+
+@pytest.mark.timeout(300)
+def test_the_plc_reads_the_outcome_of_the_inspection_that_the_end_of_the_station_has_ended(cell):
+    port = free_port()
+    patient = {"begin_deadline_s": 2.5, "station_lost_after_s": 30.0, "plc_heartbeat_timeout_s": 30.0}
+    values = json.loads(cell.file.read_text())
+    values |= {"modbus": {"port": port}, "hmi": {"port": free_port()}, "handshake": patient}
+    cell.file.write_text(json.dumps(values))
+    station = cell.start("run")
+    cell.started.append(station)
+    assert station.stdout is not None
+    assert station.stderr is not None
+    assert any(line.startswith("running; Ctrl-C") for line in station.stdout), station.stderr.read()
+
+    async def scenario():
+        async with StationClient("127.0.0.1", port, timeout_s=10) as plc:
+            await plc.arm()
+            await plc.change_recipe(2)
+            async with asyncio.timeout(90):
+                while "trigger_ready" not in await plc.status():
+                    await asyncio.sleep(0.02)
+            inspecting = asyncio.create_task(plc.inspect(1, deadline_s=90.0))
+            execute = BY_NAME["packml_state"].code("execute")
+            async with asyncio.timeout(60):
+                while await plc.read("packml_state") != execute:
+                    await asyncio.sleep(0.01)
+            station.send_signal(signal.SIGTERM)
+            return await inspecting
+
+    result = asyncio.run(scenario())
+    assert result.trigger_id == 1
+    _, log = station.communicate(timeout=120)
+    assert station.returncode == 0, log

@@ -6,12 +6,14 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import psutil
 import pytest
 
 from station.supervision import restarts, supervisor
 from station.supervision.notify import notify
+from station.supervision.programs import station_programs
 from station.supervision.restarts import RESTARTS_VARIABLE
 from station.supervision.supervisor import RESTARTS, SupervisionError
 
@@ -28,6 +30,19 @@ async def end(_supervisor, ended):
 def test_programs_start_in_order_and_end_in_reverse(bench):
     bench.run([bench.program("first"), bench.program("second")], end)
     assert bench.log() == ["start first", "start second", "end second", "end first"]
+
+
+def test_a_program_that_outlives_another_ends_right_after_it(bench):
+    names = ("twin", "service", "plc", "pages")
+    programs = [replace(bench.program(name), outlives="service" if name == "plc" else None) for name in names]
+    bench.run(programs, end)
+    assert bench.log() == [*(f"start {name}" for name in names), *("end pages", "end service", "end plc", "end twin")]
+
+
+def test_the_service_may_clean_up_as_long_as_its_site_says_and_the_plc_interface_outlives_it():
+    programs = {each.name: each for each in station_programs(None, clean_up_s=60.0)}
+    assert programs["service"].stop_limit_s > 60.0
+    assert programs["plc"].outlives == "service"
 
 
 def test_a_start_that_asks_for_more_time_gets_it_from_the_supervisor_and_from_systemd(bench, monkeypatch):
