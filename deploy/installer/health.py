@@ -23,9 +23,10 @@ def ready(layout: Layout, release: Path) -> bool:
 
 
 def wait_until_well(layout: Layout, release: Path, version: str, *, was_ready: bool, limit_s: float = LIMIT_S) -> None:
-    """Wait until the station is alive, has this version, and is ready again if it was before.
+    """Wait until the station is alive, has this version, can use its records, and is ready again if it was before.
 
-    A station without devices is alive and not ready: on a first start nothing else is to be expected.
+    A station without devices is alive and not ready: on a first start nothing else is to be expected. One that cannot
+    open its records is alive as well.
 
     Args:
         layout: its configuration has the station's address.
@@ -55,9 +56,10 @@ def _trouble(address: tuple[str, int], version: str, *, was_ready: bool) -> str:
     if found != version:
         return f"version {found} answers, not {version}"
     status, answer = _get(*address, "/readyz")
-    return (
-        f"it was ready before and is not now: {answer.get('why')}" if was_ready and status != http.HTTPStatus.OK else ""
-    )
+    if was_ready and status != http.HTTPStatus.OK:
+        return f"it was ready before and is not now: {answer.get('why')}"
+    faults = (each for each in answer.get("dependencies", ()) if each["name"] == "records" and each["state"] == "fault")
+    return next((f"it cannot use its records: {each['detail']}; {each['remedy']}" for each in faults), "")
 
 
 def _address(layout: Layout, release: Path) -> tuple[str, int]:

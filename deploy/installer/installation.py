@@ -1,6 +1,7 @@
 """Installation and upgrade: prepared and checked beside the running release, then switched, or rolled back."""
 
 import shutil
+import sqlite3
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -8,7 +9,7 @@ from installer import backup, configuration, preflight, site_files
 from installer.health import LIMIT_S, ready, wait_until_well
 from installer.layout import Layout, point, read_note, target, write_note
 from installer.messages import Failed, print_progress
-from installer.release import STAMP, Packages, Source, complete, make
+from installer.release import ROOM_BYTES, STAMP, Packages, Source, complete, make
 from installer.rollback import roll_back
 from installer.services import Services
 
@@ -49,10 +50,19 @@ class Installation:
         """
         preflight.check_machine(self._layout)
         self._source.check()
-        if not complete(self.release):
-            preflight.check_disk_space(self._layout)
+        release_bytes = 0 if complete(self.release) else ROOM_BYTES
+        if release_bytes or self.is_upgrade:
+            preflight.check_disk_space(self._layout, release_bytes, migrates=self._migrates())
         if self.is_upgrade and self._old is not None and not during_lot:
             preflight.check_no_lot(self._layout, self._old)
+
+    def _migrates(self) -> bool:
+        """Return whether the release brings the records to another schema when it opens them."""
+        try:
+            found = backup.schema_version(self._layout.home / backup.RECORDS)
+        except sqlite3.Error:  # their backup reports it
+            return False
+        return found not in ("", self._source.schema_version)
 
     def steps(self) -> list[Step]:
         """Return the steps in order. Each may be repeated; together they lead to the goal from any state between."""

@@ -9,7 +9,6 @@ from pathlib import Path
 from installer.layout import Layout
 from installer.messages import Failed, Refused
 from installer.programs import station
-from installer.release import ROOM_BYTES
 
 QUIET = timedelta(minutes=10)
 _PROGRAMS = {"runuser": "util-linux", "systemctl": "systemd", "systemd-sysusers": "systemd", "userdel": "passwd"}
@@ -32,15 +31,22 @@ def check_machine(layout: Layout) -> None:
         raise Refused(f"programs are missing: apt-get install {' '.join(sorted(missing))}")
 
 
-def check_disk_space(layout: Layout) -> None:
-    """Check that the disks have room for a release, and for a backup of the records.
+def check_disk_space(layout: Layout, release_bytes: int, *, migrates: bool) -> None:
+    """Check that the disks have room for a release, for a backup of the records, and for their migration.
+
+    Args:
+        release_bytes: 0 where the release is made already.
+        migrates: whether the release brings the records to another schema: it refuses to without room for two copies
+            of the database.
 
     Raises:
         Refused: they do not.
     """
     records = layout.home / "records"
     kept = [path for path in records.rglob("*") if path.is_file() and "aside" not in path.parts]
-    wanted = [(layout.program, ROOM_BYTES), (layout.backups, sum(file.stat().st_size for file in kept))]
+    wanted = [(layout.program, release_bytes), (layout.backups, sum(file.stat().st_size for file in kept))]
+    if migrates:
+        wanted.append((records, 2 * (records / "records.sqlite3").stat().st_size))
     disks: dict[int, tuple[Path, int]] = {}
     for path, size_bytes in wanted:
         place = next(parent for parent in (path, *path.parents) if parent.is_dir())
@@ -50,8 +56,8 @@ def check_disk_space(layout: Layout) -> None:
         free = shutil.disk_usage(place).free
         if free < size_bytes:
             raise Refused(
-                f"{place} has {free / 1e6:.0f} MB of free space, {size_bytes / 1e6:.0f} MB are needed for the program "
-                "and a copy of the records: free space, or mount another disk at /var/backups"
+                f"{place} has {free / 1e6:.0f} MB of free space, {size_bytes / 1e6:.0f} MB are needed for the program, "
+                "a copy of the records and their migration: free space, or mount another disk at /var/backups"
             )
 
 

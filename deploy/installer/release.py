@@ -47,6 +47,12 @@ class Source:
             digest.update(hashlib.sha256(file.read_bytes()).digest())
         return digest.hexdigest()
 
+    @property
+    def schema_version(self) -> str:
+        """Schema version to which it migrates the records, as its migrations name it."""
+        found = (self.folder / "station" / "records" / "migrations" / "versions").glob("[0-9]*.py")
+        return max((path.name.partition("_")[0] for path in found), default="")
+
     def check(self) -> None:
         """Check that all parts exist.
 

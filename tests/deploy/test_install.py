@@ -4,11 +4,16 @@ import fcntl
 import os
 import shutil
 import signal
+import sqlite3
 import subprocess
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pytest
+from alembic.script import ScriptDirectory
+
+from station.records.database import MIGRATIONS
 
 pytestmark = pytest.mark.timeout(900)  # on a busy machine pip takes its time
 
@@ -114,7 +119,31 @@ def test_a_machine_that_cannot_is_refused_with_the_remedy(tmp_path, installer, m
     with monkeypatch.context() as patch:
         patch.setattr(checks.shutil, "disk_usage", lambda _path: shutil._ntuple_diskusage(10**9, 9 * 10**8, 10**8))
         with pytest.raises(refused, match="has 100 MB of free space, 1500 MB are needed"):
-            checks.check_disk_space(layout(tmp_path))
+            checks.check_disk_space(layout(tmp_path), installer("release").ROOM_BYTES, migrates=False)
+
+
+def test_a_migration_of_the_records_needs_room_for_two_copies_of_the_database(tmp_path, root, installer, monkeypatch):
+    checks, layout = installer("preflight"), installer("layout").Layout(tmp_path)
+    source, services = installer("release").Source(root), installer("services").ScratchRoot(layout)
+    installation = installer("installation").Installation(layout, services, source, installer("release").Packages())
+    assert source.schema_version == ScriptDirectory(str(MIGRATIONS)).get_current_head()
+    (layout.home / "records").mkdir(parents=True)
+
+    def begin(schema):
+        (layout.home / "records/records.sqlite3").unlink(missing_ok=True)
+        with closing(sqlite3.connect(layout.home / "records/records.sqlite3")) as connection:
+            connection.executescript(
+                f"CREATE TABLE alembic_version (version_num); INSERT INTO alembic_version VALUES ('{schema}'); "
+                "CREATE TABLE fruit (data); INSERT INTO fruit VALUES (zeroblob(2000000))"
+            )
+
+    free_bytes = installer("release").ROOM_BYTES + 5_000_000
+    monkeypatch.setattr(checks.shutil, "disk_usage", lambda _path: shutil._ntuple_diskusage(10**12, 0, free_bytes))
+    begin(source.schema_version)
+    installation.check(during_lot=True)
+    begin("0001")
+    with pytest.raises(installer("messages").Refused, match="has 1505 MB of free space, 1506 MB are needed"):
+        installation.check(during_lot=True)
 
 
 def test_fruit_of_the_last_minutes_is_a_lot_under_way(tmp_path, installer, monkeypatch):
