@@ -8,7 +8,7 @@ from typing import NamedTuple
 from installer import backup, configuration, preflight, site_files
 from installer.health import LIMIT_S, ready, wait_until_well
 from installer.layout import Layout, point, read_note, target, write_note
-from installer.messages import Failed, print_progress
+from installer.messages import Failed, Refused, print_progress
 from installer.release import ROOM_BYTES, STAMP, Packages, Source, complete, make
 from installer.rollback import roll_back
 from installer.services import Services
@@ -91,7 +91,7 @@ class Installation:
 
         Raises:
             Refused: the configuration is not valid in the new release; the old one runs on.
-            Failed: a step failed. After a failed upgrade, the old release is in use again.
+            Failed: a step failed. After a failed upgrade, the old release is in use again, or the text says why not.
         """
         under_way = False
         for step in self.steps():
@@ -104,9 +104,15 @@ class Installation:
                 if not under_way:
                     raise
                 print_progress(str(error))
-                roll_back(self._layout, self._services, self._limit_s)
+                self._roll_back()
                 old = self._old.name if self._old else "nothing"
                 raise Failed(f"{self.release.name} is not in use: {old} is again; correct the cause") from error
+
+    def _roll_back(self) -> None:
+        try:
+            roll_back(self._layout, self._services, self._limit_s)
+        except Refused as refusal:
+            raise Failed(f"the upgrade cannot be taken back: {refusal}; then deploy/install --rollback") from refusal
 
     def _make(self) -> None:
         site_files.make_folder(self._layout, self._layout.program)

@@ -1,21 +1,23 @@
 """Rollback to the release before the last upgrade, with data that this release can read."""
 
+import json
 import shutil
+from pathlib import Path
 
 from installer import backup, site_files
 from installer.health import LIMIT_S, wait_until_well
 from installer.layout import Layout, point, read_note, target
-from installer.messages import Refused, print_progress
+from installer.messages import Failed, Refused, print_progress
 from installer.programs import own, station
 from installer.release import STAMP, complete
 from installer.services import Services
 
 
 def check(layout: Layout) -> None:
-    """Check that there is a release to roll back to, and that it can read the records, or the backup has older ones.
+    """Check that there is a release to roll back to, and that it can read the records, or has room to restore them.
 
     Raises:
-        Refused: there is none, or it cannot.
+        Refused: there is none, or it cannot, or the backup that it needs is gone.
     """
     old, note = target(layout.previous), read_note(layout.upgrade)
     if old is None or not complete(old) or not note:
@@ -25,6 +27,14 @@ def check(layout: Layout) -> None:
         raise Refused(
             f"{copy} is gone, and {old.name} cannot read the records as they are: put this backup back to its place"
         )
+    if _restores(layout, copy):
+        size_bytes = read_note(copy / backup.RECORDS / "backup.json").get("size_bytes", 0)
+        needed, free = size_bytes + _reserve_bytes(layout), shutil.disk_usage(layout.home).free
+        if free < needed:
+            raise Refused(
+                f"{layout.home} has {free / 1e6:.0f} MB of free space, {needed / 1e6:.0f} MB are needed to restore the "
+                f"records that {old.name} can read: free space"
+            )
 
 
 def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> None:
@@ -50,9 +60,7 @@ def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> N
         layout.configuration.write_text(note["configuration"], encoding="utf-8")
         own(layout, layout.configuration, "root", "fruit-station")
         print_progress(f"{layout.configuration} is as before the upgrade")
-    if (copy / backup.RECORDS).is_dir() and backup.schema_version(
-        layout.home / backup.RECORDS
-    ) != backup.schema_version(copy / backup.RECORDS):
+    if _restores(layout, copy):
         station(layout, old, "records", "restore", copy / backup.RECORDS, limit_s=4 * 3600.0)
         print_progress(
             f"the records are as before the upgrade; what came since is in {layout.home / backup.RECORDS / 'aside'}"
@@ -66,3 +74,17 @@ def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> N
     layout.upgrade.unlink()
     layout.previous.unlink()
     print_progress(f"{old.name} is in use again")
+
+
+def _restores(layout: Layout, copy: Path) -> bool:
+    """Return whether the old release needs the records of its backup: those in use have another schema."""
+    records, old = layout.home / backup.RECORDS, copy / backup.RECORDS
+    return old.is_dir() and backup.schema_version(records) != backup.schema_version(old)
+
+
+def _reserve_bytes(layout: Layout) -> int:
+    """Return what a restore leaves free; 0 where the release in use cannot read its configuration."""
+    try:
+        return 1_000_000 * json.loads(station(layout, layout.current, "config", "show"))["records"]["free_reserve_mb"]
+    except Failed:
+        return 0

@@ -24,6 +24,7 @@ from station.records.restore import restore_backup
 from station.records.short_transaction import short_transaction
 from station.records.signing import public_keys_of
 from station.records.texts import printable
+from station.settings.configuration import load_configuration
 
 _ROLE = "command line"
 _thing = click.argument("thing", metavar="SEQUENCE|LOT")
@@ -151,11 +152,13 @@ def backup(directory: Path, config: Path | None) -> None:
 def restore(directory: Path, by: str, public_keys: tuple[Path, ...], *, unverified: bool, config: Path | None) -> None:
     """Replace the records by the backup in DIR, while no station runs. The present records are moved aside.
 
-    The backup has to be signed by this station, or by the one whose public key is given.
+    The backup has to be signed by this station, or by the one whose public key is given. The space below which the
+    station accepts no trigger has to stay free.
     """
-    folder = folder_of(config)
+    site = load_configuration(config)
+    folder = records_folder(site.home)
     keys = None if unverified else public_keys_of(folder, public_keys)
-    restored = restore_backup(folder, directory, by, keys)
+    restored = restore_backup(folder, directory, by, keys, site.records.free_reserve_mb * MB)
     click.echo(f"restored {restored.inspections} inspections and {restored.images} images from {directory}")
     if restored.aside is not None:
         click.echo(f"what was there is in {restored.aside}")

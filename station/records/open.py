@@ -3,6 +3,7 @@
 import fcntl
 import logging
 import os
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +32,9 @@ LOCK_NAME = "lock"
 NOTICE_NAME = "notice.json"
 """File of the notice of lost records, from before anything is moved aside until its alarm is stored: neither a failed
 opening nor an end of the process forgets it."""
+
+RESTORING = "restoring"
+"""Folder of a restore's copy until it takes the records' place."""
 
 BELONGING = (FOLDER_NAME, f"{FILE_NAME}-wal", f"{FILE_NAME}-shm", FILE_NAME)
 """Files that are moved aside together. The database goes last: while it exists the next start continues the move, and a
@@ -101,6 +105,7 @@ def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
         RecordsError: they cannot be opened.
     """
     path = folder / FILE_NAME
+    shutil.rmtree(folder / RESTORING, ignore_errors=True)  # of a restore that was killed: its backup still exists
     try:
         mark = HighWaterMark(folder / MARK_NAME)
         notices = _move_damaged_aside(folder, mark)

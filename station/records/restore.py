@@ -17,16 +17,14 @@ from station.records.audit_head import Head, read_head, try_save_head
 from station.records.backup import Manifest, copy_image, hash_of, integrity, open_regular, read_manifest
 from station.records.database import FILE_NAME, migrate, move_aside, new_aside, open_engine
 from station.records.error_mapping import map_error
-from station.records.errors import DamagedError, RecordsError
+from station.records.errors import DamagedError, DiskFullError, RecordsError
 from station.records.high_water_mark import MARK_NAME, HighWaterMark
 from station.records.images import FOLDER_NAME, image_path
-from station.records.open import BELONGING, lock_folder
+from station.records.open import BELONGING, RESTORING, lock_folder
 from station.records.retention import forget_missing, referred
 from station.records.schema import origins, outbox
 from station.records.schema_check import check_schema
 from station.records.signing import PublicKeys
-
-_NEW = "restoring"
 
 
 class RestoreResult(NamedTuple):
@@ -38,7 +36,9 @@ class RestoreResult(NamedTuple):
     """Folder of the previous records."""
 
 
-def restore_backup(folder: Path, directory: Path, by: str, keys: PublicKeys | None) -> RestoreResult:
+def restore_backup(
+    folder: Path, directory: Path, by: str, keys: PublicKeys | None, reserve_bytes: int = 0
+) -> RestoreResult:
     """Restore a backup, all of it or nothing. Numbers given since it was made are not given again.
 
     All is copied and verified first, beside the records; then the present records are moved aside and the copy replaces
@@ -46,22 +46,28 @@ def restore_backup(folder: Path, directory: Path, by: str, keys: PublicKeys | No
 
     Args:
         keys: of stations, of which one has to have signed the backup; None for a backup without a known signature.
+        reserve_bytes: left free on the records' disk.
 
     Raises:
-        RecordsError: a station runs, the backup is not complete or not signed, or the disk failed; the records are
-            unchanged.
+        RecordsError: a station runs, the backup is not complete or not signed, there is no space, or the disk failed;
+            the records are unchanged.
     """
     manifest = read_manifest(directory, keys)
     lock = lock_folder(folder)
-    new = folder / _NEW
+    new = folder / RESTORING
     try:
         shutil.rmtree(new, ignore_errors=True)
-        (new / FOLDER_NAME).mkdir(parents=True)
-        _copied(directory, new, manifest)
-        mark = HighWaterMark(folder / MARK_NAME)
-        mark.value = max(mark.value, manifest.sequence)
-        mark.save()
-        head = _continue(folder, new, manifest, by)
+        _check_room(folder, manifest, reserve_bytes)
+        try:
+            (new / FOLDER_NAME).mkdir(parents=True)
+            _copied(directory, new, manifest)
+            mark = HighWaterMark(folder / MARK_NAME)
+            mark.value = max(mark.value, manifest.sequence)
+            mark.save()
+            head = _continue(folder, new, manifest, by)
+        except BaseException:  # half a copy would take the space that the present records need
+            shutil.rmtree(new, ignore_errors=True)
+            raise
         present = [name for name in BELONGING if (folder / name).exists()]
         aside = new_aside(folder) if present else None
         if aside is not None:
@@ -77,6 +83,14 @@ def restore_backup(folder: Path, directory: Path, by: str, keys: PublicKeys | No
     finally:
         os.close(lock)
     return RestoreResult(manifest.inspections, manifest.images, aside)
+
+
+def _check_room(folder: Path, manifest: Manifest, reserve_bytes: int) -> None:
+    free, wanted = shutil.disk_usage(folder).free, manifest.size_bytes + reserve_bytes
+    if free < wanted:
+        raise DiskFullError(
+            messages.NO_SPACE_FOR_BACKUP(path=str(folder), free=free, wanted=wanted), messages.FREE_SPACE()
+        )
 
 
 def _copied(directory: Path, new: Path, manifest: Manifest) -> None:

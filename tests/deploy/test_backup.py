@@ -252,3 +252,27 @@ def test_a_rollback_without_its_copy_is_refused_where_the_records_need_it(instal
     installer("layout").write_note(installed.upgrade, {**note, "schema": "7"})
     made_before(installed, note["copy"], 1)
     check(installed)
+
+
+def test_a_rollback_without_room_to_restore_the_records_is_refused_before_the_station_stops(
+    installed, installer, monkeypatch
+):
+    old, rollback = installed.current.resolve(), installer("rollback")
+    installer("layout").point(installed.previous, old)
+    copy = installed.backups / "before-upgrade-20260101T000000Z"
+    for folder, schema in ((installed.home, 8), (copy, 7)):
+        (folder / "records").mkdir(parents=True)
+        with closing(sqlite3.connect(folder / "records/records.sqlite3")) as connection:
+            connection.executescript(
+                f"CREATE TABLE alembic_version (version_num); INSERT INTO alembic_version VALUES ({schema})"
+            )
+    (copy / "records/backup.json").write_text(json.dumps({"sequence": 1, "size_bytes": 30_000_000}))
+    note = {"from": old.name, "to": "0.2.0+test", "copy": copy.name, "schema": "7", "configuration": None}
+    installer("layout").write_note(installed.upgrade, note)
+    monkeypatch.setattr(rollback, "station", lambda *_words: '{"records": {"free_reserve_mb": 200}}')
+    free = [229_000_000]
+    monkeypatch.setattr(rollback.shutil, "disk_usage", lambda _path: shutil._ntuple_diskusage(10**12, 0, free[0]))
+    with pytest.raises(installer("messages").Refused, match="has 229 MB of free space, 230 MB are needed to restore"):
+        rollback.roll_back(installed, None)
+    free[0] = 230_000_000
+    rollback.check(installed)

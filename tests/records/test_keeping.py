@@ -1,6 +1,7 @@
 """Held images stay; a copy is whole; a check finds what is wrong; and what is put back goes on."""
 
 import asyncio
+import errno
 import json
 import shutil
 import sqlite3
@@ -209,6 +210,49 @@ def test_a_backup_on_the_records_own_disk_leaves_the_station_its_reserve(
     assert refused.exit_code == 1
     assert "the reserve that the station needs" in str(refused.exception)
     assert not (tmp_path / "copy").exists()
+
+
+def test_a_restore_leaves_the_station_its_reserve(
+    opened, scenario, inspected, noise, folder, tmp_path, ask, monkeypatch
+):
+    async def steps():
+        async with opened() as records:
+            await inspected(records, 1, noise())
+
+    scenario(steps)
+    make_backup(folder, tmp_path / "copy")
+    monkeypatch.setenv("STATION_RECORDS_FREE_RESERVE_MB", "1000000")
+    refused = ask("restore", tmp_path / "copy")
+    assert isinstance(refused.exception, DiskFullError)
+    assert "the reserve that the station needs" in str(refused.exception)
+    assert not (folder / "restoring").exists()
+    assert not (folder / "aside").exists()
+
+
+def test_a_restore_that_fails_leaves_no_half_copy_and_a_start_removes_one_that_was_killed(
+    opened, scenario, inspected, noise, folder, tmp_path, monkeypatch
+):
+    async def steps():
+        async with opened() as records:
+            await inspected(records, 1, noise())
+
+    def full(*_):
+        assert (folder / "restoring" / FILE_NAME).exists(), "the database is copied first"
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    scenario(steps)
+    make_backup(folder, tmp_path / "copy")
+    before = (folder / FILE_NAME).read_bytes()
+    with monkeypatch.context() as patch:
+        patch.setattr("station.records.restore.copy_image", full)
+        with pytest.raises(DiskFullError):
+            restore_backup(folder, tmp_path / "copy", "ada", public_keys_of(folder))
+    assert not (folder / "restoring").exists()
+    assert (folder / FILE_NAME).read_bytes() == before
+    assert not (folder / "aside").exists()
+    (folder / "restoring" / "images").mkdir(parents=True)
+    scenario(steps)
+    assert not (folder / "restoring").exists()
 
 
 def test_a_check_finds_what_is_wrong_and_the_next_start_reconciles(
