@@ -1,4 +1,7 @@
-"""A PostgreSQL server of one's own, reached over a UNIX socket, which no other account's processes are children of."""
+"""A PostgreSQL server of one's own, reached over a UNIX socket, which no other account's processes are children of.
+
+It listens on TCP as well where it is given an address of its own.
+"""
 
 import os
 import pwd
@@ -30,10 +33,11 @@ class Server:
     Args:
         folder: its data and its socket; short, as a socket's path has to be.
         bin_folder: where initdb and pg_ctl are.
+        address: on which it listens too; empty for the socket alone.
     """
 
-    def __init__(self, folder: Path, bin_folder: Path) -> None:
-        self.folder, self._bin = folder, bin_folder
+    def __init__(self, folder: Path, bin_folder: Path, address: str = "") -> None:
+        self.folder, self.address, self._bin = folder, address, bin_folder
 
     def initialise(self) -> None:
         """Make the database cluster and start it, with our tables in the database `fruit`."""
@@ -52,7 +56,8 @@ class Server:
 
     def start(self) -> None:
         """Start it; returns when it answers."""
-        options = f"-c listen_addresses='' -c unix_socket_directories={self.folder} -c fsync=off -c max_wal_size=1GB"
+        listening = f"-c listen_addresses='{self.address}' -c unix_socket_directories={self.folder}"
+        options = f"{listening} -c fsync=off -c max_wal_size=1GB"
         data, log = self.folder / "data", self.folder / "log"
         self._call("pg_ctl", "start", "--wait", "-D", data, "-l", log, "-o", options)
 
@@ -82,14 +87,10 @@ class Server:
 
 
 @contextmanager
-def throwaway(bin_folder: Path) -> Iterator[Server]:
-    """A server that is gone afterwards, with its data.
-
-    Args:
-        bin_folder: where its programs are.
-    """
+def throwaway(bin_folder: Path, address: str = "") -> Iterator[Server]:
+    """A server that is gone afterwards, with its data; the arguments as of `Server`."""
     folder = Path(tempfile.mkdtemp(prefix="pg-"))
-    server = Server(folder, bin_folder)
+    server = Server(folder, bin_folder, address)
     try:
         server.initialise()
         yield server

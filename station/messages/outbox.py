@@ -31,7 +31,10 @@ OTHER_SCHEMA = define(
 )
 UPDATE_STATION = define("outbox.update_station", "bring this station to the version of the others")
 NAME_TAKEN = define("outbox.name_taken", "another process publishes as {station}")
-OWN_NAME = define("outbox.own_name", "give each station a name of its own: outbox.station")
+OWN_NAME = define(
+    "outbox.own_name",
+    "wait a minute where this station was just cut off, else give each station a name of its own: outbox.station",
+)
 PASSWORD_OPEN = define("outbox.password_open", "{file}: others than its owner can read the password")
 CLOSE_PASSWORD = define("outbox.close_password", "chmod 600 {file}")
 PASSWORD_UNREADABLE = define("outbox.password_unreadable", "{file}: the password cannot be read: {error}")

@@ -24,6 +24,13 @@ _CONNECT_S = 5
 _STATEMENT_MS = 60_000
 _SILENT_MS = 20_000
 """A peer that acknowledges nothing for so long counts as lost."""
+_IDLE_S, _INTERVAL_S, _PROBES = 10, 5, 3
+"""TCP keepalives of both ends: with the usual two hours at the server's, a station that lost its power would find its
+name taken by the session that it had before."""
+_OPTIONS = (
+    f"-c statement_timeout={_STATEMENT_MS} -c timezone=UTC -c tcp_user_timeout={_SILENT_MS} "
+    f"-c tcp_keepalives_idle={_IDLE_S} -c tcp_keepalives_interval={_INTERVAL_S} -c tcp_keepalives_count={_PROBES}"
+)
 
 _INSPECTION: tuple[LiteralString, ...] = (
     "station", "sequence", "began", "ended", "duration_ms", "published", "lot", "fruit", "recipe_sha256", "outcome",
@@ -80,11 +87,11 @@ class Postgresql:
                 connect_timeout=_CONNECT_S,
                 application_name=f"fruit-station {self._station}",
                 keepalives=1,
-                keepalives_idle=10,
-                keepalives_interval=5,
-                keepalives_count=3,
+                keepalives_idle=_IDLE_S,
+                keepalives_interval=_INTERVAL_S,
+                keepalives_count=_PROBES,
                 tcp_user_timeout=_SILENT_MS,
-                options=f"-c statement_timeout={_STATEMENT_MS} -c timezone=UTC",
+                options=_OPTIONS,
             )
             async with connection:
                 await self._prepare(connection)

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.archive import many, postgres
+from tests.hosts import fresh_host
 from tests.ports import free_port
 from tests.tools import required
 
@@ -20,7 +21,7 @@ LIMIT_S = 60.0
 @pytest.fixture(scope="session")
 def server(postgresql_programs: Path) -> Iterator[postgres.Server]:
     """A running PostgreSQL with our tables."""
-    with postgres.throwaway(postgresql_programs) as started:
+    with postgres.throwaway(postgresql_programs, fresh_host()) as started:
         yield started
 
 

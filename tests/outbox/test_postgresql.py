@@ -149,10 +149,26 @@ def test_a_connection_that_is_cut_while_there_is_nothing_to_tell_is_noticed(serv
     assert time.monotonic() - began_s < LIMIT_S, "noticed, not waited for"
 
 
+def test_the_server_too_notices_that_a_station_was_cut_off(server):
+    """Until then the session of before keeps the station's name."""
+
+    async def steps():
+        async with Postgresql(settings(server, host=server.address), "cut-off").connected() as session:
+            query = "SELECT name, setting FROM pg_settings WHERE name LIKE 'tcp_%'"
+            assert dict(await (await session._connection.execute(query)).fetchall()) == {
+                "tcp_keepalives_idle": "10",
+                "tcp_keepalives_interval": "5",
+                "tcp_keepalives_count": "3",
+                "tcp_user_timeout": "20000",
+            }
+
+    asyncio.run(steps())
+
+
 def test_two_processes_cannot_tell_as_one_station(server):
     async def steps():
         async with Postgresql(settings(server), "one").connected():
-            with pytest.raises(OutboxError, match="another process publishes as one; give each station a name"):
+            with pytest.raises(OutboxError, match="another process publishes as one; wait a minute where this"):
                 async with Postgresql(settings(server), "one").connected():
                     pass
 
