@@ -47,6 +47,14 @@ class _Set(NamedTuple):
 class _NotStoredError(StationError):
     """An inspection's images are not stored, for the reason in its message."""
 
+    result = "dropped"
+
+
+class _OverQuotaError(_NotStoredError):
+    """An accepted fruit's images are not stored: the quota is full of those of rejected fruit, as it is meant to be."""
+
+    result = "over_quota"
+
 
 def image_path(folder: Path, sha256: str) -> str:
     """Return the path of the image whose bytes have this SHA-256 (not a `Path`: see `station.atomic_file`)."""
@@ -128,7 +136,7 @@ class ImageStore:
             state, left = messages.IMAGES_KEPT(), 0
         except _NotStoredError as error:
             state, left = messages.IMAGES_DROPPED(cause=error.message), len(work.images) - len(rows)
-            self.results["dropped"] += left
+            self.results[error.result] += left
         except Exception as error:  # noqa: BLE001 (an image must not cost the thread)
             left = len(work.images) - len(rows)
             cause = map_error(error, str(self._folder / FOLDER_NAME)).cause
@@ -165,6 +173,8 @@ class ImageStore:
         while (over := self.size_bytes + needed_bytes > quota_bytes) or self._free_bytes() < reserve_bytes:
             removed = self._record(lambda connection: remove_oldest_images(connection, for_accepted=accepted))
             if removed is None:
+                if over and accepted:
+                    raise _OverQuotaError(messages.QUOTA_FULL())
                 raise _NotStoredError(messages.QUOTA_FULL() if over else messages.DISK_NEARLY_FULL())
             freed_bytes, names = removed
             for name in names:

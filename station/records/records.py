@@ -62,7 +62,7 @@ class Status:
     images_waiting: int
     """Inspections whose images are not yet on the disk."""
     images: dict[str, int]
-    """Images since the start: `kept`, `dropped`, `failed`, `removed`."""
+    """Images since the start: `kept`, `dropped`, `failed`, `removed`, `over_quota`."""
     database_bytes: int
     image_bytes: int
     free_bytes: int

@@ -116,6 +116,24 @@ def test_beyond_the_quota_the_oldest_accepted_go_first_then_the_oldest_rejected(
     scenario(steps)
 
 
+def test_accepted_fruit_beyond_a_quota_that_is_full_of_rejected_ones_is_no_loss(
+    opened, scenario, inspected, noise, settled
+):
+    async def steps():
+        async with opened(accepted_share=1.0, images_quota_mb=1) as records:
+            for _ in range(3):
+                await inspected(records, noise(side_px=315))
+                await settled(records)
+            number = await inspected(records, noise(side_px=315), accepted=True)
+            await settled(records)
+            assert (await records.inspection(number)).images_state == messages.IMAGES_DROPPED(
+                cause=messages.QUOTA_FULL()
+            )
+            assert records.status().images == {"kept": 3, "over_quota": 1}
+
+    scenario(steps)
+
+
 def test_what_goes_first_is_sought_among_the_images_and_not_among_all_fruit_ever_inspected(tmp_path):
     engine = open_engine(tmp_path / FILE_NAME, "rwc")
     migrate(engine, tmp_path)

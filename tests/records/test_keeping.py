@@ -54,6 +54,7 @@ def test_what_is_on_hold_stays_until_it_is_released(opened, scenario, inspected,
             await inspected(records, 1, noise(side_px=320))
             last = await records.inspection(6)
             assert last.images_state == messages.IMAGES_DROPPED(cause=messages.QUOTA_FULL())
+            assert records.status().images["dropped"] == 1, "a rejected fruit's images are lost"
             await records.change(lambda connection: release(connection, "A-17", "all is well", "ada"))
             assert (await asyncio.to_thread(ask, "release", 1, "--reason", "answered")).exit_code == 0
             await inspected(records, 1, noise(side_px=320))

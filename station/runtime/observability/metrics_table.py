@@ -28,7 +28,7 @@ LABELS: dict[str, frozenset[str] | int] = {
     "process": 16,
     "kind": frozenset({"database", "images"}),
     "code": 16,
-    "result": frozenset({"kept", "dropped", "failed", "removed"}),
+    "result": frozenset({"kept", "dropped", "failed", "removed", "over_quota"}),
     "destination": frozenset({"postgresql", "mqtt"}),
     "version": 1,
     "python": 1,
@@ -175,7 +175,7 @@ TABLE: dict[str, Row] = {
         ("result",),
         "Images by what became of them",
         at_scrape=True,
-        known=(("kept",), ("dropped",), ("failed",), ("removed",)),
+        known=(("kept",), ("dropped",), ("failed",), ("removed",), ("over_quota",)),
     ),
     "backup_timestamp": Row(
         "station_backup_timestamp_seconds",
