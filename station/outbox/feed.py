@@ -25,6 +25,8 @@ from station.records.stored_message import FIRST_PRESS, JUDGEMENT, from_stored, 
 from station.records.write_requests import OutboxKind
 
 LARGEST_BATCH = 500
+_NEAR = 100
+"""Entries before one that may date it: enough for a few fruit, few enough to be read with each batch."""
 _LAST_UTC_MS = 253_402_300_799_000
 """The end of the year 9999: a clock beyond it must not block the outbox."""
 
@@ -92,7 +94,7 @@ def read_batch(folder: Path, station: str, after: int, limit: int = LARGEST_BATC
                 for row, data in rows.items()
             ]
         told.sort(key=lambda event: event.entry)
-        oldest = None if not told else _done_utc_ms(connection, entries[0])
+        oldest = None if not told else _queued_utc_ms(connection, entries[0])
     return Batch(lineage, tuple(told), entries[-1].entry if entries else after, last, oldest)
 
 
@@ -198,13 +200,21 @@ def _audit(connection: Connection, seqs: list[int]) -> dict[int, dict[str, Any]]
     return {row.seq: {**row._asdict(), "at": _time(row.utc_ms)} for row in rows}
 
 
-def _done_utc_ms(connection: Connection, entry: Row[Any]) -> int | None:
+def _queued_utc_ms(connection: Connection, entry: Row[Any]) -> int | None:
+    """Return the time of an entry, which has none of its own: its row's, or a later one of the audit trail before it.
+
+    A row may be old when it changes, as an inspection whose images make room, and the trail seals each change first.
+    """
     column, key = {
         "inspection": (inspections.c.published_utc_ms, inspections.c.sequence),
-        "lot": (lots.c.began_utc_ms, lots.c.id),
+        "lot": (func.coalesce(lots.c.ended_utc_ms, lots.c.began_utc_ms), lots.c.id),
         "audit": (audit.c.utc_ms, audit.c.seq),
     }[entry.kind]
-    return connection.scalar(select(column).where(key == entry.row))
+    row_utc_ms = connection.scalar(select(column).where(key == entry.row))
+    near = outbox.c.entry.between(entry.entry - _NEAR, entry.entry)
+    before = select(outbox.c.row).where(outbox.c.kind == "audit", near)
+    trail_utc_ms = connection.scalar(select(func.max(audit.c.utc_ms)).where(audit.c.seq.in_(before)))
+    return max((found for found in (row_utc_ms, trail_utc_ms) if found is not None), default=None)
 
 
 def _dumped(data: Any) -> str:
