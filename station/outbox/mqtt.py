@@ -72,19 +72,20 @@ class Session:
 
     def __init__(self, client: aiomqtt.Client, root: str, position: Path) -> None:
         self._client, self._root, self._path = client, root, position
+        self._kept: dict[str, int] = {}
+        """By origin, also of those that are lost: a backup of one may be restored."""
 
     async def position(self, lineage: Batch) -> int:
         """Return the last entry that was published; at the very first start the newest: history is not published."""
         try:
-            kept: dict[str, int] = json.loads(self._path.read_bytes())
+            self._kept = json.loads(self._path.read_bytes())
         except FileNotFoundError:
             self._keep(lineage, lineage.last)
             return lineage.last
         except (OSError, ValueError) as error:
             log.warning("%s: %s; publishing goes on with what is new", self._path, error)
-            kept = {}
-        known = lineage.known(kept)
-        return lineage.last if known is None and not kept else known or 0
+        known = lineage.known(self._kept)
+        return lineage.last if known is None and not self._kept else known or 0
 
     async def publish(self, batch: Batch) -> None:
         """Publish the entries after the position, each event after the broker has acknowledged the one before."""
@@ -102,5 +103,6 @@ class Session:
                     pass
 
     def _keep(self, batch: Batch, position: int) -> None:
+        self._kept[batch.lineage[0].id] = position
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(self._path, json.dumps({batch.lineage[0].id: position}).encode())
+        write_atomically(self._path, json.dumps(self._kept).encode())

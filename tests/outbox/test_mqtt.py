@@ -4,12 +4,14 @@ import asyncio
 import json
 import logging
 import re
+from typing import Any
 
 import aiomqtt
 import pytest
 
 from station.outbox.errors import OutboxError
-from station.outbox.mqtt import Mqtt
+from station.outbox.feed import Batch, Origin
+from station.outbox.mqtt import Mqtt, Session
 from station.outbox.publisher import Publisher
 from station.settings.outbox import OutboxMqttSettings
 from tests.eventually import until
@@ -102,3 +104,26 @@ def test_a_password_that_others_can_read_is_refused(broker, mqtt):
 
     with pytest.raises(OutboxError, match=re.escape(f"chmod 600 {broker.password_file}")):
         asyncio.run(steps())
+
+
+def test_after_a_loss_of_the_records_and_a_restore_no_history_is_published_again(tmp_path):
+    def lineage(*origins, last):
+        return Batch(tuple(Origin(*origin) for origin in origins), (), last, last, None)
+
+    no_broker: Any = None
+
+    async def publish(batch):
+        """As one connection does."""
+        session = Session(no_broker, "fruit/line-7", tmp_path / "outbox" / "mqtt.json")
+        position = await session.position(batch)
+        await session.publish(batch)
+        return position
+
+    async def steps():
+        assert await publish(lineage(("A", None), last=5000)) == 5000, "history is not published at the first start"
+        assert await publish(lineage(("X", None), last=40)) == 0, "begun anew after a loss: nothing of it is omitted"
+        restored = lineage(("C", None), ("A", 4000), last=4001)
+        assert await publish(restored) == 4000, "a backup of the lost records, which were published up to here"
+        assert await publish(lineage(("C", None), ("A", 4000), last=4010)) == 4001
+
+    asyncio.run(steps())
