@@ -7,5 +7,5 @@ login() {
 CREATE ROLE :"name" LOGIN PASSWORD :'password' IN ROLE :"group";
 SQL
 }
-login station_1 fruit_station station_postgresql
+login station_1 fruit_station postgresql_station
 login grafana fruit_reader grafana_postgresql

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from station.outbox.secrets import password
 from station.records.last_backup import last_backup_utc_s
 
 
@@ -168,6 +169,8 @@ def test_a_replacement_machine_is_restored_as_the_document_has_it(root, installe
         if now:
             (new.home / name).write_text(now)
     lost.configuration.write_text("hmi: {port: 9443}\n")
+    (lost.settings / "postgresql-password").write_text("secret\n")
+    (lost.settings / "postgresql-password").chmod(0o600)
     public_key = station(lost, "audit", "public-key")
     assert backup(root, lost).returncode == 0
     (made,) = lost.backups.iterdir()
@@ -204,6 +207,8 @@ def test_a_replacement_machine_is_restored_as_the_document_has_it(root, installe
     assert (after.st_uid, after.st_gid) == (before.st_uid, before.st_gid)
     log = (tmp_path / "log").read_text()
     assert f"chgrp -R fruit-station {new.settings}" in log
+    assert password(new.settings / "postgresql-password", "PGPASSWORD") == "secret"
+    assert f"chown fruit-station {new.settings}/postgresql-password\n" in log, "the station's, as before"
     assert "systemd-tmpfiles --create fruit-station.conf" in log
     assert log.splitlines()[-1] == "systemctl start fruit-station"
 

@@ -1,5 +1,6 @@
 """Image and compose file, as far as they can be checked without a container engine: their form and promises."""
 
+import os
 import re
 import subprocess
 import tomllib
@@ -7,6 +8,8 @@ from pathlib import Path
 
 import pytest
 import yaml
+
+from station.outbox.secrets import password
 
 SERVICES = {"station", "prometheus", "alertmanager", "grafana", "postgresql"}
 ELSEWHERE = ("./prometheus/", "./grafana/")
@@ -52,17 +55,24 @@ def test_nothing_is_secret_and_what_is_comes_as_a_file(compose, root):
     assert tracked.stdout.split() == ["deploy/containers/secrets/.gitignore"]
 
 
-def test_the_documented_commands_make_every_secret(compose, root, tmp_path):
+def test_the_documented_commands_make_every_secret_and_the_station_takes_its_own(compose, root, tmp_path):
     page = (root / "docs/deployment.md").read_text()
     block = re.search(r"```\n(cd deploy\n.*?)```", page, re.DOTALL)
     assert block is not None
     secrets = tmp_path / "containers/secrets"
     secrets.mkdir(parents=True)
-    loops = "\n".join(line for line in block[1].splitlines() if line.startswith("for "))
-    subprocess.run(["bash", "-euc", loops], cwd=tmp_path, check=True, timeout=60)
+    (tmp_path / "sudo").write_text('#!/bin/sh\nshift 5\nexec install "$@"\n')  # only root may give a file away
+    (tmp_path / "sudo").chmod(0o755)
+    commands = "\n".join(line for line in block[1].splitlines() if line.startswith(("for ", "sudo install -o 990 ")))
+    path = f"{tmp_path}:{os.environ['PATH']}"
+    subprocess.run(["bash", "-euc", commands], cwd=tmp_path, check=True, timeout=60, env={**os.environ, "PATH": path})
     assert {file.name for file in secrets.iterdir()} == {
         Path(each["file"]).name for each in compose["secrets"].values()
     }
+    given = (secrets / "postgresql_station").read_text().strip()
+    assert password(secrets / "station_postgresql", "PGPASSWORD") == given
+    assert compose["services"]["station"]["secrets"] == ["station_postgresql"]
+    assert "station_postgresql" not in compose["services"]["postgresql"]["secrets"], "whose user cannot read it"
 
 
 def test_what_is_mounted_is_there_and_what_is_written_is_a_volume(compose, root):
