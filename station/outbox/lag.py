@@ -35,7 +35,7 @@ class OutboxMonitor:
         return joined(late) if late else None
 
     def _late(self, name: str, each: DestinationStatus, now_s: float) -> Message | None:
-        since_utc_ms = each.away_since_utc_ms if each.waiting is None else each.oldest_utc_ms
+        since_utc_ms = each.waiting_since_utc_ms
         age_s = 0.0 if since_utc_ms is None else now_s - since_utc_ms / 1000
         if age_s <= self._settings.alarm_after_s and (each.waiting or 0) <= self._settings.alarm_after_rows:
             return None

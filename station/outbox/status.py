@@ -29,6 +29,11 @@ class DestinationStatus(BaseModel):
     away_since_utc_ms: int | None = None
     """Start of the fault."""
 
+    @property
+    def waiting_since_utc_ms(self) -> int | None:
+        """Time since which something may wait: of the first entry, or of the fault while that is not known."""
+        return self.away_since_utc_ms if self.waiting is None else self.oldest_utc_ms
+
 
 class OutboxStatus(BaseModel):
     """Status of all destinations."""

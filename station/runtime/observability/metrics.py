@@ -241,7 +241,7 @@ def _of_outbox(status: OutboxStatus) -> Iterator[Metric]:
     gauges: Values = {
         "outbox_connected": {(name,): each.connected for name, each in told},
         "outbox_waiting": {(name,): each.waiting for name, each in told},
-        "outbox_lag": {(name,): age_s(each.oldest_utc_ms) for name, each in told},
+        "outbox_lag": {(name,): age_s(each.waiting_since_utc_ms) for name, each in told},
         "outbox_age": {(): age_s(status.utc_ms)},
     }
     yield from _families(gauges, {"outbox_refused": {(name,): each.refused for name, each in told}})

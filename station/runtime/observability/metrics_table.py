@@ -198,7 +198,7 @@ TABLE: dict[str, Row] = {
         "station_outbox_lag_seconds",
         "gauge",
         ("destination",),
-        "Time since the first of them was done, by the machine's clock; 0 where none waits",
+        "Time since the first of them was made, by the machine's clock; 0 where none waits; while unknown, time away",
         at_scrape=True,
     ),
     "outbox_refused": Row(

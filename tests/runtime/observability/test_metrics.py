@@ -1,5 +1,6 @@
 """What is scraped: named by the conventions, bounded, and equal to the records."""
 
+import time
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -134,6 +135,20 @@ def test_what_is_not_known_is_absent_and_not_nought(metrics):
     assert not [key for key in found if key[0] == "station_link_age_seconds"]
     metrics.watch_records(lambda: Status(0, {}, 0, 0, {}, 0, 0, 0, None, None))
     assert ("station_records_last_write_age_seconds",) not in scraped(metrics)
+
+
+def test_another_system_that_was_never_reached_is_behind_since_the_start(metrics):
+    now_ms = time.time_ns() // 1_000_000
+
+    def lag_s(**values):
+        usual = {"connected": False, "told": 0, "refused": 0, "waiting": None, "oldest_utc_ms": None, "error": None}
+        told = DestinationStatus(**dict[str, Any]({**usual, **values}))
+        metrics.watch_outbox(lambda: OutboxStatus(utc_ms=now_ms, destinations={"postgresql": told}))
+        return scraped(metrics)["station_outbox_lag_seconds", ("destination", "postgresql")]
+
+    assert lag_s(away_since_utc_ms=now_ms - 90_000) == pytest.approx(90, abs=30)
+    assert lag_s(waiting=0, away_since_utc_ms=now_ms - 90_000) == 0, "away, and nothing waits"
+    assert lag_s(waiting=3, oldest_utc_ms=now_ms - 180_000, away_since_utc_ms=now_ms - 90_000) > 170
 
 
 def test_a_link_that_is_never_heard_has_an_age_from_the_start(metrics, clock):
