@@ -4,6 +4,7 @@ import fcntl
 import logging
 import os
 import shutil
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -98,8 +99,11 @@ def lock_folder(folder: Path) -> int:
     return descriptor
 
 
-def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
+def open_records(folder: Path, settings: RecordsSettings, boot: str, failures: Counter[str]) -> Opened:
     """Open the records for this start of the station, `boot`; the folder is locked by the caller. Blocks.
+
+    Args:
+        failures: counts the requests that failed, by the code of their error.
 
     Raises:
         RecordsError: they cannot be opened.
@@ -111,7 +115,7 @@ def open_records(folder: Path, settings: RecordsSettings, boot: str) -> Opened:
         notices = _move_damaged_aside(folder, mark)
         _migrate(folder)
         sync_folder(folder)
-        writer = Writer(*_connector(path, mark), str(path))
+        writer = Writer(*_connector(path, mark), str(path), failures)
         try:
             head, public_key = read_head(folder), name_of(own_public_key(folder))
             lost = writer.submit(

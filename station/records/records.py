@@ -6,6 +6,7 @@ import logging
 import os
 import shutil
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -56,7 +57,7 @@ class Status:
     writes: int
     """Transactions that were committed."""
     failures: dict[str, int]
-    """Requests that failed, by the code of their error."""
+    """Requests and openings that failed since the start, by the code of their error."""
     queue: int
     """Requests that wait for the writer."""
     images_waiting: int
@@ -84,6 +85,8 @@ class Records:
         """The inspections that it ended with `station_lost`."""
         self._settings = settings
         self._boot = boot
+        self._failures: Counter[str] = Counter()
+        """Of all openings: a fault is followed by the next one."""
         self._opened: Opened | None = None
         self._why_closed: RecordsError = RecordsClosedError(messages.CLOSED(), messages.OPEN_FIRST())
         self._lock: int | None = None
@@ -125,8 +128,9 @@ class Records:
         try:
             if self._lock is None:
                 self._lock = lock_folder(self.folder)
-            self._opened = open_records(self.folder, self._settings, self._boot)
+            self._opened = open_records(self.folder, self._settings, self._boot, self._failures)
         except RecordsError as error:
+            self._failures[error.code] += 1
             self._why_closed = error
             raise
         self.notices, self.lost = self._opened.notices, self._opened.lost
@@ -339,7 +343,7 @@ class Records:
         written_s = opened.writer.last_write_s if opened else None
         return Status(
             writes=opened.writer.writes if opened else 0,
-            failures=dict(opened.writer.failures) if opened else {},
+            failures=dict(self._failures),
             queue=opened.writer.waiting if opened else 0,
             images_waiting=opened.images.waiting if opened else 0,
             images=dict(opened.images.results) if opened else {},
@@ -365,6 +369,7 @@ class Records:
             async with asyncio.timeout(deadline_s):
                 return await asyncio.wrap_future(future)
         except TimeoutError:
+            self._failures[RecordsDeadlineError.code] += 1
             raise RecordsDeadlineError(messages.TOO_SLOW(limit_s=deadline_s), messages.CHECK_DISK()) from None
 
     async def _read(self, question: Callable[[Connection], T]) -> T:

@@ -42,6 +42,7 @@ class Writer:
         before_commit: Callable[[Connection], None],
         after_commit: Callable[[], None],
         place: str,
+        failures: Counter[str],
     ) -> None:
         """Start the thread.
 
@@ -50,18 +51,18 @@ class Writer:
             before_commit: called in each transaction after its requests; if it raises, all of them fail.
             after_commit: called after each commit's answers; never raises.
             place: the database's path, for messages.
+            failures: counts the requests that failed, by the code of their error.
 
         Raises:
             RecordsError: no connection could be made.
         """
         self.writes = 0
-        self.failures: Counter[str] = Counter()
         self.last_write_s: float | None = None
         self.error: Message | None = None
         self._connect = connect
         self._connection: Connection | None = None
         self._before_commit, self._after_commit = before_commit, after_commit
-        self._place = place
+        self._place, self._failures = place, failures
         self._queue: queue.SimpleQueue[tuple[Work[Any], Future[Any]] | None] = queue.SimpleQueue()
         self._closed = False
         self._gate = threading.Lock()
@@ -139,7 +140,7 @@ class Writer:
             committed = True
         for (_, future), answer in zip(batch, answers, strict=True):
             if isinstance(answer, RecordsError):
-                self.failures[answer.code] += 1
+                self._failures[answer.code] += 1
                 future.set_exception(answer)
             else:
                 future.set_result(answer)

@@ -152,6 +152,25 @@ def test_a_database_that_becomes_read_only_is_told_and_got_over(opened, scenario
     scenario(steps)
 
 
+def test_failures_are_counted_over_each_opening_and_while_there_is_none(opened, scenario, trigger, monkeypatch):
+    def read_only(*_):
+        raise ReadOnlyError(messages.NOT_WRITABLE(place="records", words="no"), messages.MAKE_WRITABLE())
+
+    async def steps():
+        async with opened() as records:
+            await _run_in_writer(records, lambda connection: connection.exec_driver_sql("PRAGMA query_only = 1"))
+            with pytest.raises(ReadOnlyError):
+                await records.begin(trigger)
+            await records.reopen()
+            assert records.status().failures == {"read_only": 1}
+            monkeypatch.setattr("station.records.records.open_records", read_only)
+            with pytest.raises(ReadOnlyError):
+                await records.reopen()
+            assert records.status().failures == {"read_only": 2}
+
+    scenario(steps)
+
+
 async def _run_in_writer(records, work):
     return await asyncio.wrap_future(records._opened.writer.submit(work))
 
@@ -195,6 +214,7 @@ def test_a_begin_that_came_too_late_is_withdrawn(opened, scenario, trigger):
             under_way = asyncio.create_task(records.begin(trigger))
             with pytest.raises(RecordsDeadlineError, check=because(messages.TOO_SLOW)):
                 await under_way
+            assert records.status().failures == {"deadline": 1}
             gate.set()
             await waiting
         async with opened() as records:
