@@ -128,8 +128,8 @@ class Installation:
         backup.prune(self._layout, BEFORE, _COPIES_KEPT, copy)
         note = {"from": self._old.name, "to": self.release.name}
         before = read_note(self._layout.upgrade)
-        # An interrupted upgrade has perhaps changed the file already: what it was before is in the earlier note.
-        known = before.get("configuration") if note.items() <= before.items() else None
+        # An interrupted upgrade, also to another release, may have changed the file: the earlier note has it as before.
+        known = before.get("configuration") if before.get("from") == self._old.name else None
         text = self._layout.configuration.read_text(encoding="utf-8") if self._changes else known
         schema = backup.schema_version(copy / backup.RECORDS)
         write_note(self._layout.upgrade, {**note, "copy": copy.name, "schema": schema, "configuration": text})

@@ -53,11 +53,12 @@ def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> N
     print_progress(f"back to {old.name}")
     services.stop()
     copy = layout.backups / str(note["copy"])
-    if note["configuration"] is not None:
+    before = note["configuration"]
+    if before is not None and layout.configuration.read_text(encoding="utf-8") != before:  # not yet, by an earlier call
         shutil.copyfile(
             layout.configuration, layout.configuration.with_name(f"{layout.configuration.name}.rolled-back")
         )
-        layout.configuration.write_text(note["configuration"], encoding="utf-8")
+        layout.configuration.write_text(before, encoding="utf-8")
         own(layout, layout.configuration, "root", "fruit-station")
         print_progress(f"{layout.configuration} is as before the upgrade")
     if _restores(layout, copy):

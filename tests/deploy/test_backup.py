@@ -1,6 +1,7 @@
 """Copies of records, state and configuration, as the timer has them made."""
 
 import grp
+import itertools
 import json
 import os
 import pwd
@@ -10,6 +11,7 @@ import subprocess
 import sys
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -281,3 +283,88 @@ def test_a_rollback_without_room_to_restore_the_records_is_refused_before_the_st
         rollback.roll_back(installed, None)
     free[0] = 230_000_000
     rollback.check(installed)
+
+
+@pytest.fixture
+def upgraded(installed, installer, monkeypatch):
+    """An installation whose upgrade changes "old" to "new" in the configuration, and whose programs are stand-ins."""
+    layouts, numbers = installer("layout"), itertools.count(1)
+    installed.configuration.write_text("# old\n")
+
+    def changes(layout, _release):
+        return ("old is new now",) if "old" in layout.configuration.read_text() else ()
+
+    def migrate(layout, _release):
+        layout.configuration.write_text(layout.configuration.read_text().replace("old", "new"))
+
+    def make_backup(layout, _release, kind):
+        (copy := layout.backups / f"{kind}{next(numbers)}").mkdir()
+        return copy
+
+    def make(layout, source, _packages):
+        (layout.releases / source.name).mkdir()
+        layouts.write_note(layout.releases / source.name / "release.json", {"version": source.version})
+
+    monkeypatch.setattr(installer("configuration"), "try_with", changes)
+    monkeypatch.setattr(installer("configuration"), "migrate", migrate)
+    monkeypatch.setattr(installer("backup"), "make_backup", make_backup)
+    monkeypatch.setattr(installer("installation"), "make", make)
+    for name in ("put", "make_folder", "make_folders"):
+        monkeypatch.setattr(installer("site_files"), name, lambda *_: None)
+    return installed
+
+
+@pytest.fixture
+def services():
+    """Services of which nothing runs."""
+    started = dict.fromkeys(("running", "start"), lambda: False)
+    return SimpleNamespace(**dict.fromkeys(("stop", "reload", "enable", "make_user"), lambda: None), **started)
+
+
+def test_an_upgrade_after_one_to_another_release_was_interrupted_is_taken_back_to_the_configuration_of_before(
+    upgraded, installer, services
+):
+    failed, old = installer("messages").Failed, upgraded.current.resolve()
+
+    def upgrade(version):
+        source = SimpleNamespace(name=f"{version}+test", version=version, folder=upgraded.root)
+        return installer("installation").Installation(upgraded, services, source, None)
+
+    for step in upgrade("0.2.0").steps()[:5]:  # up to the configuration's migration; then somebody pulled the plug
+        step.do()
+    assert upgraded.configuration.read_text() == "# new\n"
+    starts = iter([failed("it does not start")])
+
+    def start():
+        for error in starts:
+            raise error
+        return False
+
+    services.start = start
+    with pytest.raises(failed, match=r"0\.2\.1\+test is not in use: 0\.1\.0\+test is again"):
+        upgrade("0.2.1").run()
+    assert upgraded.configuration.read_text() == "# old\n"
+    assert upgraded.current.resolve() == old
+
+
+def test_a_rollback_that_is_repeated_keeps_the_configuration_that_it_replaced(
+    upgraded, installer, services, monkeypatch
+):
+    rollback, failed = installer("rollback"), installer("messages").Failed
+    installer("layout").point(upgraded.previous, upgraded.current.resolve())
+    note = {"from": "0.1.0+test", "copy": "before-upgrade-1", "schema": "", "configuration": "# old\n"}
+    installer("layout").write_note(upgraded.upgrade, note)
+    upgraded.configuration.write_text("# new, and a person's\n")
+    answers = iter([failed("the station is not well"), None])
+
+    def wait(*_words, **_options):
+        if (error := next(answers)) is not None:
+            raise error
+
+    monkeypatch.setattr(rollback, "wait_until_well", wait)
+    services.start = lambda: True
+    with pytest.raises(failed, match="not well"):
+        rollback.roll_back(upgraded, services)
+    rollback.roll_back(upgraded, services)
+    assert upgraded.configuration.read_text() == "# old\n"
+    assert upgraded.configuration.with_name("station.yaml.rolled-back").read_text() == "# new, and a person's\n"
