@@ -1,9 +1,12 @@
 """Backup of everything that a site cannot recreate: records, state and configuration."""
 
 import contextlib
+import fcntl
 import itertools
+import os
 import shutil
 import sqlite3
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -29,6 +32,8 @@ _DATABASE = Path("records.sqlite3")
 def make_backup(layout: Layout, release: Path, kind: str) -> Path:
     """Back up records, state and configuration into a new folder; the station may run meanwhile.
 
+    Another backup that is being made is awaited: each removes what an interrupted one has left.
+
     Args:
         release: its program backs up the records.
         kind: the first part of the folder's name.
@@ -39,6 +44,11 @@ def make_backup(layout: Layout, release: Path, kind: str) -> Path:
     Raises:
         Failed: the records could not be copied, for example because the disk is full, or a file cannot be read.
     """
+    with _alone(layout):
+        return _make_backup(layout, release, kind)
+
+
+def _make_backup(layout: Layout, release: Path, kind: str) -> Path:
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     names = (f"{kind}{stamp}{'' if number == 1 else f'-{number}'}" for number in itertools.count(1))
     copy = next(path for name in names if not (path := layout.backups / name).exists())
@@ -47,12 +57,15 @@ def make_backup(layout: Layout, release: Path, kind: str) -> Path:
         shutil.rmtree(left, ignore_errors=True)
     partial.mkdir(mode=0o750)
     own(layout, partial, NAME, NAME)
-    if (layout.home / RECORDS / _DATABASE).exists():
+    has_records = (layout.home / RECORDS / _DATABASE).exists()
+    if has_records:
         station(layout, release, "records", "backup", partial / RECORDS, limit_s=LONG_S)
     kept = [path.name for path in layout.home.iterdir() if path.name not in LEFT_OUT] if layout.home.is_dir() else []
     for name in kept:
         _copied(layout.home / name, partial / STATE / name)
     _copied(layout.settings, partial / SETTINGS)
+    if has_records and not (partial / RECORDS / _DATABASE).exists():
+        raise Failed(f"{partial} has no records, so there is no backup: somebody removed them; make another")
     partial.rename(copy)
     # Made anew: where root makes the backup, it must not follow a link which the station's user has put there.
     (layout.home / LAST_BACKUP).unlink(missing_ok=True)
@@ -68,12 +81,28 @@ def prune(layout: Layout, kind: str, keep: int, made: Path) -> None:
     sort before older ones. Numbers never go down, so those with a higher one than `made` are of records before a new
     beginning, and are the oldest.
     """
-    last = _sequence(made)
-    others = [path for path in layout.backups.glob(f"{kind}*") if path.is_dir() and path != made]
-    others.sort(key=lambda path: ((number := _sequence(path)) <= last, number, path.name))
-    for path in others[: max(0, len(others) + 1 - keep)]:
-        shutil.rmtree(path)
-        print_progress(f"removed {path}, which was older than the last {keep}")
+    with _alone(layout):
+        last = _sequence(made)
+        others = [path for path in layout.backups.glob(f"{kind}*") if path.is_dir() and path != made]
+        others.sort(key=lambda path: ((number := _sequence(path)) <= last, number, path.name))
+        for path in others[: max(0, len(others) + 1 - keep)]:
+            shutil.rmtree(path)
+            print_progress(f"removed {path}, which was older than the last {keep}")
+
+
+@contextlib.contextmanager
+def _alone(layout: Layout) -> Iterator[None]:
+    """Wait until no other backup is made or removed: an upgrade's and the daily one may meet."""
+    home = os.open(layout.home, os.O_RDONLY)  # the backups may be on a network disk, whose folders cannot be locked
+    try:
+        try:
+            fcntl.flock(home, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            print_progress("another backup is being made: this one begins after it")
+            fcntl.flock(home, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(home)
 
 
 def _sequence(copy: Path) -> int:

@@ -9,6 +9,7 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
@@ -105,6 +106,35 @@ def test_a_complete_copy_is_what_the_metrics_tell_the_time_of(root, installed):
     (installed.home / "records/records.sqlite3").write_text("this is no database")
     assert backup(root, installed).returncode == 1
     assert last_backup_utc_s(installed.home) == 1.0
+
+
+def test_of_two_backups_at_once_the_second_waits_and_both_are_complete(installer, installed, monkeypatch):
+    (installed.home / "records").mkdir()
+    (installed.home / "records/records.sqlite3").touch()
+    module, release, others = installer("backup"), installed.current.resolve(), []
+
+    def copy_records(_layout, _release, *words, **_options):
+        if not others:  # the daily one begins while the upgrade's copies; without waiting it would end at once
+            others.append(pool.submit(module.make_backup, installed, release, "daily-"))
+            wait(others, timeout=1.0)
+        words[-1].mkdir()
+        (words[-1] / "records.sqlite3").touch()
+
+    monkeypatch.setattr(module, "station", copy_records)
+    with ThreadPoolExecutor(1) as pool:
+        first = module.make_backup(installed, release, "before-upgrade-")
+        copies = [first, others[0].result(60)]
+    assert sorted(installed.backups.iterdir()) == sorted(copies)
+    assert all((copy / "records/records.sqlite3").exists() for copy in copies)
+
+
+def test_a_backup_whose_records_are_gone_is_none(installer, installed, monkeypatch):
+    (installed.home / "records").mkdir()
+    (installed.home / "records/records.sqlite3").touch()
+    monkeypatch.setattr(installer("backup"), "station", lambda *_words, **_options: None)
+    with pytest.raises(installer("messages").Failed, match="has no records, so there is no backup"):
+        installer("backup").make_backup(installed, installed.current.resolve(), "daily-")
+    assert not [path for path in installed.backups.iterdir() if not path.name.startswith(".")]
 
 
 def test_a_link_that_the_stations_user_put_there_is_not_followed(root, installed, installer, monkeypatch, tmp_path):
