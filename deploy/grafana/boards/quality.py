@@ -52,7 +52,7 @@ GROWERS = (
         f"""SELECT {GROWER} AS grower, fruit, {ALL}::text AS inspected, {FAILED} AS failed
         FROM hourly_outcomes_of_growers WHERE {HERE}
         GROUP BY 1, fruit ORDER BY 4 DESC NULLS LAST""", width=12),
-    sql("bars", "Failed by grower and day", "percentunit", "Share of the judged fruit.", "alarms.md#reject-rate",
+    sql("lines", "Failed by grower and day", "percentunit", "Share of the judged fruit.", "alarms.md#reject-rate",
         f"""SELECT date_trunc('day', hour) AS time, {GROWER} AS metric, {FAILED} AS failed
         FROM hourly_outcomes_of_growers WHERE {HERE} GROUP BY 1, 2 ORDER BY 1""", width=12),
 )  # fmt: skip

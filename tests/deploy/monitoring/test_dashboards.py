@@ -33,6 +33,15 @@ def test_a_panel_has_a_unit_a_description_and_a_link(panel):
     assert not anchor or anchor in headings(ROOT / "docs" / path), anchor
 
 
+def test_no_shares_are_stacked():
+    """Two growers of whose fruit 60 % failed do not make 120 %."""
+    shares = [panel for panel in PANELS if panel.data["fieldConfig"]["defaults"]["unit"] == "percentunit"]
+    assert shares
+    for panel in shares:
+        stacking = panel.data["fieldConfig"]["defaults"].get("custom", {}).get("stacking", {})
+        assert stacking.get("mode", "none") == "none", panel.title
+
+
 @pytest.mark.parametrize("name", dashboards())
 def test_a_dashboard_can_be_loaded(name):
     board = dashboards()[name]
