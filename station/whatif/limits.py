@@ -106,10 +106,13 @@ def marked_fruit(press: Press, recipe: Recipe, closing_mm: float, *, good: bool,
 def exponent_of(fruit: Sequence[MarkedFruit]) -> Exponent | None:
     """Fit the exponent of the area in the length: one slope for good and bad fruit, each with its own level.
 
+    An area by which no limit passes the fruit is left out, since it is not trusted: the border cuts the large ones.
+
     Returns:
-        None with fewer than four fruit of known length and area, or all of one length.
+        None with fewer than four fruit of known length and trusted area, or all of one length.
     """
-    known = [(one.good, one.length_mm, one.area_mm2) for one in fruit if one.length_mm and one.area_mm2]
+    trusted = [one for one in fruit if math.isfinite(one.passes_from_mm2)]
+    known = [(one.good, one.length_mm, one.area_mm2) for one in trusted if one.length_mm and one.area_mm2]
     if len(known) < 4:
         return None
     good = np.array([each[0] for each in known])

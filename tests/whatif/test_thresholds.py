@@ -131,6 +131,23 @@ def test_the_exponent_is_found_within_the_kinds():
     assert exponent_of([MarkedFruit(True, 0.0, 100.0, 45.0)] * 9) is None
 
 
+def test_the_exponent_is_not_fitted_to_areas_that_the_judge_does_not_trust():
+    """Of the fruit over 50 mm the border cuts a fifth off."""
+    random = np.random.default_rng(1)
+    fruit = []
+    for number, length_mm in enumerate(random.uniform(30, 62, 40)):
+        area_mm2 = 4.5 * length_mm**0.78 * random.normal(1, 0.09)
+        one = MarkedFruit(number % 2 == 0, 1.2 * area_mm2, area_mm2, length_mm)
+        fruit.append(replace(one, passes_from_mm2=math.inf, area_mm2=0.8 * area_mm2) if length_mm > 50 else one)
+    found = exponent_of(fruit)
+    assert found is not None
+    assert found.fruit == sum(math.isfinite(one.passes_from_mm2) for one in fruit) < 35
+    assert found.value == pytest.approx(0.78, abs=2 * found.standard_error)
+    fooled = exponent_of([replace(one, passes_from_mm2=0.0) for one in fruit])
+    assert fooled is not None
+    assert fooled.value < 0.78 - 4 * fooled.standard_error
+
+
 def test_fruit_are_compared_at_the_reference_length():
     fruit = [MarkedFruit(True, 100.0, 90.0, 40.0), MarkedFruit(False, 100.0, 90.0, None)]
     good, bad = at_reference(fruit, 0.5, 90.0)
