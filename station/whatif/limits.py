@@ -80,7 +80,7 @@ def marked_fruit(press: Press, recipe: Recipe, closing_mm: float, *, good: bool,
     A press that the judge rejects for other reasons than a limit is diverted by every limit. A fruit whose steps the
     judge ended before has at least the measured area; leaving out the worst of the bad fruit would be wrong. Of these,
     a good one counts as diverted, a bad one as passed by any larger limit, the less favourable case, unless an earlier
-    limit or the growth has proven it damaged: those the draft keeps.
+    limit or the growth, which the draft keeps, has proven it damaged or lets it pass no more.
 
     Args:
         recipe: that it was pressed by.
@@ -96,7 +96,10 @@ def marked_fruit(press: Press, recipe: Recipe, closing_mm: float, *, good: bool,
         return MarkedFruit(good, sum(area) if passes else math.inf, area[0], limits.length_mm)
     if early_stop(press, recipe) is None:
         return None
-    if judge(press, _with_open_limit(draft, closing_mm)).outcome == "FAIL":
+    verdict = judge(press, _with_open_limit(draft, closing_mm))
+    # Without a finding it is not the early stop that ended the steps, which a draft may raise.
+    cannot_pass = verdict.outcome != "PASS" and verdict.stopped is not None and verdict.stopped.finding is None
+    if verdict.outcome == "FAIL" or cannot_pass:
         return MarkedFruit(good, math.inf, None, limits.length_mm)
     known = [point.area_mm2 for point in evidence.judged if evidence.bounds(point)]
     at_least = max(known) if known and not good else math.inf
@@ -231,11 +234,19 @@ def least_area_at(recipe: Recipe, closing_mm: float) -> float:
 
 
 def _with_open_limit(recipe: Recipe, closing_mm: float) -> Recipe:
-    """Return the recipe with its earlier limits and growth, and an area at a closing that nothing is over."""
+    """Return the recipe with its earlier limits and growth, and an area at a closing that nothing is over.
+
+    It stops where the outcome is decided, so that the verdict states it.
+    """
     open_limit = {"closing_mm": closing_mm, "area_mm2": LARGEST_AREA_MM2}
     earlier = [each for each in recipe.damage.area if each.closing_mm < closing_mm]
     area = (*earlier, recipe.damage.area[-1].model_copy(update=open_limit))
-    return recipe.model_copy(update={"damage": recipe.damage.model_copy(update={"area": area})})
+    return recipe.model_copy(
+        update={
+            "damage": recipe.damage.model_copy(update={"area": area}),
+            "steps": recipe.steps.model_copy(update={"stop_when_decided": True}),
+        }
+    )
 
 
 def _with_largest_limits(recipe: Recipe, closing_mm: float) -> Recipe:
