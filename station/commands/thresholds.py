@@ -1,6 +1,7 @@
 """`station thresholds`: proposed limit from fruit marked good and bad, with the cost of both errors."""
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from station.whatif.limits import Costs, least_area_at, rate_interval
 from station.whatif.marks import read_marks
 from station.whatif.proposal import Proposal, figures_of, proposals
 from station.whatif.proposal_page import lines_of, page_of
-from station.whatif.replay import recipe_of_snapshot, replay
+from station.whatif.replay import measured_otherwise, pressed_otherwise, recipe_of_snapshot, replay
 from station.whatif.stored import StoredPress, read_stored, sequences, snapshots
 
 _PART = 500
@@ -60,12 +61,13 @@ def thresholds(
     site, costs = load_configuration(config), Costs(false_accept, damaged)
     recipe, folder = find_recipe(name, site.recipes_folder), records_folder(site.home)
     marked = _stored_marks(folder) if marks is None else read_marks(marks)
-    stored, own = _marked(folder, recipe.name, lots, set(marked))
+    stored, own, left_out = _marked(folder, recipe, lots, set(marked))
     for mark in ("good", "bad"):
         if not any(marked[each.sequence] == mark for each in stored):
+            others = "".join(f"; {number} marked fruit are left out: {why}" for why, number in left_out.items())
             raise BadInputError(
                 f"{marks or folder}: none of the fruit marked {mark} is a judged {recipe.name} in the records; a limit "
-                "needs fruit of both kinds"
+                f"needs fruit of both kinds{others}"
             )
     found = proposals(stored, marked, own, recipe, costs)
     if not found:
@@ -78,6 +80,7 @@ def thresholds(
     told = {
         "false_accept_cost": costs.false_accept,
         "damaged_share": costs.damaged_share,
+        "of_other_revisions": dict(left_out),
         "proposed": figures_of(best, costs),
         "other_closings": [figures_of(each, costs) for each in found[1:]],
         "by_the_proposed_recipe": {mark: _rate(stored, marked, mark, own, proposed) for mark in ("good", "bad")},
@@ -105,16 +108,31 @@ def _stored_marks(folder: Path) -> dict[int, Mark]:
 
 
 def _marked(
-    folder: Path, name: str, lots: Sequence[str], marked: set[int]
-) -> tuple[list[StoredPress], dict[str, Recipe]]:
-    """Read the marked inspections that have a curve, with the recipes that they were judged by."""
+    folder: Path, recipe: Recipe, lots: Sequence[str], marked: set[int]
+) -> tuple[list[StoredPress], dict[str, Recipe], Counter[str]]:
+    """Read the marked inspections that have a curve, pressed and measured as by the recipe.
+
+    Returns:
+        They, the recipes that they were judged by, and how many others are left out, by the reason.
+    """
     with reading(folder) as connection:
-        wanted = [sequence for sequence in sequences(connection, name, lots, None) if sequence in marked]
-        texts = snapshots(connection, name)
+        wanted = [sequence for sequence in sequences(connection, recipe.name, lots, None) if sequence in marked]
+        revisions = {sha256: recipe_of_snapshot(text) for sha256, text in snapshots(connection, recipe.name).items()}
         parts = [wanted[start : start + _PART] for start in range(0, len(wanted), _PART)]
         stored = [each for part in parts for each in read_stored(connection, part, folder, with_images=False)]
-    own = {sha256: recipe for sha256, text in texts.items() if (recipe := recipe_of_snapshot(text)) is not None}
-    return [each for each in stored if each.recipe_sha256 in own and each.press.onset_mm is not None], own
+    why_not = {sha256: _why_no_evidence(own, recipe) for sha256, own in revisions.items()}
+    left_out = Counter(why for each in stored if (why := why_not[each.recipe_sha256]))
+    kept = [each for each in stored if not why_not[each.recipe_sha256] and each.press.onset_mm is not None]
+    return kept, {sha256: own for sha256, own in revisions.items() if own is not None}, left_out
+
+
+def _why_no_evidence(own: Recipe | None, recipe: Recipe) -> str | None:
+    """Return why the areas of a revision's fruit are no evidence for a limit of the recipe; None if they are."""
+    if own is None:
+        return "this version does not accept their revision"
+    if otherwise := pressed_otherwise(own, recipe):
+        return f"their revision pressed otherwise ({otherwise.parameters['fields']})"
+    return "their revision measured otherwise" if measured_otherwise(own, recipe) else None
 
 
 def _draft(recipe: Recipe, best: Proposal, name: str, folder: Path | None) -> tuple[Recipe, str]:

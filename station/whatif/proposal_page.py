@@ -68,6 +68,7 @@ def lines_of(figures: dict[str, Any]) -> list[str]:
         lines.append(
             f"{best['at_least']} fruit ended before {best['closing_mm']:g} mm: their area is only known to be larger"
         )
+    lines.extend(f"{number} marked fruit left out: {why}" for why, number in figures["of_other_revisions"].items())
     if best["not_known"]:
         lines.append(f"{best['not_known']} marked fruit tell nothing: a fault ended their steps")
     lines.extend(

@@ -284,6 +284,44 @@ def test_a_limit_is_proposed_from_marked_fruit_and_written_as_a_draft(orchard, d
 
 
 @pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"imaging__settle_s": 0.5}, "their revision pressed otherwise (imaging)"),
+        ({"segmentation__robust__gate_ratio": 4.0}, "their revision measured otherwise"),
+    ],
+)
+def test_marked_fruit_of_a_revision_that_pressed_or_measured_otherwise_are_left_out(
+    orchard, station, changed, tmp_path, changes, why
+):
+    """By the other revision the areas are larger: of its fruit alone the limit would be another."""
+    other = replace(orchard, recipe=changed(orchard.recipe, **changes))
+
+    def figures(name: str) -> tuple[dict[str, object], str]:
+        code, told = station("thresholds", "--recipe", "strawberry", "--out", tmp_path / name)
+        assert code == 0, told
+        return json.loads((tmp_path / name / "thresholds.json").read_text()), told
+
+    def store_and_mark(orchard, good: list[float], bad: list[float]) -> None:
+        made = orchard.store([orchard.press(growth, seed=number) for number, growth in enumerate([*good, *bad])])
+        for word, some in (("good", made[: len(good)]), ("bad", made[len(good) :])):
+            assert station("records", "mark", *some, word)[0] == 0
+
+    store_and_mark(other, [29 + number / 4 for number in range(12)], [44.0, 45.0, 46.0])
+    code, told = station("thresholds", "--recipe", "strawberry", "--out", tmp_path / "none")
+    assert (code, f"15 marked fruit are left out: {why}" in told) == (2, True), told
+    store_and_mark(orchard, [25 + number / 4 for number in range(12)], [40.0, 41.0, 42.0])
+    both, told = figures("both")
+    assert f"15 marked fruit left out: {why}" in told
+    assert both.pop("of_other_revisions") == {why: 15}
+    for sequence in range(1, 16):
+        assert station("records", "mark", sequence, "none")[0] == 0
+    alone, told = figures("alone")
+    assert "left out:" not in told
+    assert alone.pop("of_other_revisions") == {}
+    assert both == alone
+
+
+@pytest.mark.parametrize(
     ("decided_by", "drafted"), [("every_trusted", "every_trusted"), ("first_trusted", "every_limit")]
 )
 def test_the_proposed_limit_decides_on_every_fruit(
