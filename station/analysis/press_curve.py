@@ -1,6 +1,6 @@
 """Area curve of each press among the images of an analysis."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -29,9 +29,10 @@ class PressCurve:
     """The points that do not fit the others of the press."""
 
 
-def press_curve(number: int, steps: Sequence[Step]) -> PressCurve:
-    """Make the curve of a press from its steps, in the order of falling width."""
-    curve = area_curve(step.reading for step in steps)
+def press_curve(number: int, steps: Iterable[Step]) -> PressCurve:
+    """Make the curve of a press from its steps, in the order of measuring."""
+    ordered = sorted(steps, key=lambda step: -step.reading.width_mm)  # as the curve's points: a read width may jitter
+    curve = area_curve(step.reading for step in ordered)
     readings = [point.reading for point in curve.points]
     wrong = wrong_frames([reading.width_mm for reading in readings], [reading.area_mm2 for reading in readings])
-    return PressCurve(number, [step.row for step in steps] if curve.points else [], curve, wrong)
+    return PressCurve(number, [step.row for step in ordered] if curve.points else [], curve, wrong)

@@ -1,10 +1,16 @@
 """Measuring order: the presses among the images, and the order of their steps."""
 
 from collections.abc import Mapping, Sequence
-from itertools import groupby, pairwise
+from itertools import groupby
 from typing import NamedTuple
 
+import numpy as np
+
 from station.analysis.sources import Source
+
+_OPENED_UM = 100
+"""By more than this above a press's narrowest width the jaws have opened, µm. Ours: between readings at one place,
+which differ by some hundredths of a millimetre, and a count of the gripper, 0.4 mm."""
 
 
 class Run(NamedTuple):
@@ -21,8 +27,8 @@ def runs(sources: Sequence[Source], widths_mm: Mapping[str, float] | None, *, se
 
     A video, a folder, and the files that were named one by one are one press each. Without widths the order given is
     the order in time. With widths it is the order of falling width, unless the images come from a video, the user
-    states that they are a sequence, or a width repeats: then the given order is used, and a press ends where the width
-    rises.
+    states that they are a sequence, or a width repeats: then the given order is used, and a press ends where the jaws
+    have opened.
 
     Args:
         sources: in the order given by the user.
@@ -55,25 +61,28 @@ def singles(sources: Sequence[Source]) -> list[Run]:
 
 
 def _by_width(numbers: Sequence[int], widths_mm: Mapping[int, float], *, in_time: bool) -> list[Run]:
-    if not in_time and not _comes_back([widths_mm[number] for number in numbers]):
+    widths_um = {number: round(1000 * widths_mm[number]) for number in numbers}  # whole ones, to be compared exactly
+    if not in_time and not _comes_back([widths_um[number] for number in numbers]):
         return [Run(tuple(sorted(numbers, key=lambda number: -widths_mm[number])), followed=True)]
     presses: list[list[int]] = []
+    narrowest_um = 0
     for number in numbers:
-        if not presses or widths_mm[number] > widths_mm[presses[-1][-1]]:  # the jaws have opened
+        if not presses or widths_um[number] > narrowest_um + _OPENED_UM:
             presses.append([])
+            narrowest_um = widths_um[number]
         presses[-1].append(number)
+        narrowest_um = min(narrowest_um, widths_um[number])
     return [Run(tuple(press), followed=True) for press in presses]
 
 
-def _comes_back(widths_mm: Sequence[float]) -> bool:
-    """Check whether a width, to 0.1 mm, repeats after a narrower one: the jaws have opened in between.
+def _comes_back(widths_um: Sequence[int]) -> bool:
+    """Check whether a width repeats after a narrower one: the jaws have opened in between.
 
     It does not in a press whose images are only named in another order, because the jaws only close.
     """
-    rounded = [round(width, 1) for width in widths_mm]
-    places: dict[float, list[int]] = {}
-    for place, width in enumerate(rounded):
-        places.setdefault(width, []).append(place)
-    return any(
-        min(rounded[first:second]) < width for width, those in places.items() for first, second in pairwise(those)
-    )
+    widths = np.array(widths_um)
+    for place, width in enumerate(widths):
+        narrower = np.flatnonzero(widths[:place] < width - _OPENED_UM)
+        if narrower.size and (np.abs(widths[: narrower[-1]] - width) <= _OPENED_UM).any():
+            return True
+    return False

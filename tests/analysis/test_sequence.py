@@ -208,6 +208,22 @@ def test_a_press_ends_where_the_jaws_open(widths, sequence, expected):
     assert by_name(sources, runs(sources, table, sequence=sequence)) == expected
 
 
+@pytest.mark.parametrize("sequence", [False, True])
+@pytest.mark.parametrize(
+    ("widths_mm", "lengths"),
+    [
+        ((40.06, 40.04, 40.06, 39.02, 39.01, 39.02, 38.0, 38.0, 38.0), [9]),
+        ((40.0, 40.1, 39.0, 39.1, 38.3, 38.4), [6]),
+        ((40.0, 39.0, 40.0), [2, 1]),
+        ((40.06, 39.02, 39.01, 39.02, 40.04, 40.05, 39.0), [4, 3]),
+    ],
+)
+def test_a_width_that_is_read_several_times_is_no_opening_of_the_jaws(widths_mm, lengths, sequence):
+    sources = [source(f"{number}") for number in range(len(widths_mm))]
+    table: dict[str, float] = {each.name: width_mm for each, width_mm in zip(sources, widths_mm, strict=True)}
+    assert [len(run.numbers) for run in runs(sources, table, sequence=sequence)] == lengths
+
+
 def test_videos_folders_and_files_are_presses_of_their_own():
     sources = [
         source("a"), source("B", 1), source("C", 1), source("d"), source("?", refused=True), source("E", 3, video=True),
@@ -325,6 +341,33 @@ def test_each_closing_of_the_jaws_has_its_own_curve_by_either_method(tmp_path: P
     assert [plot.count(f">press {words}<") for words in ("1: onset at 39 mm", "2: no onset", "3: onset at 40 mm")] == [
         1, 1, 1,
     ]  # fmt: skip
+
+
+def test_a_curve_has_each_image_beside_its_own_area_where_a_read_width_rises_a_little(tmp_path: Path, monkeypatch):
+    widths_mm = (40.04, 40.06, 39.02, 38.0)
+    for number, level in enumerate((50, 60, 100, 120)):
+        cv2.imwrite(str(tmp_path / f"step_{number}.png"), np.full((64, 64, 3), level, np.uint8))
+    monkeypatch.setattr("station.analysis.analysis.make_method", lambda *_: Stub())
+    request = Request(
+        sources=list_sources([tmp_path]).sources,
+        references=[Decoded(np.zeros((64, 64, 3), np.uint8), ())],
+        reference_name="reference",
+        segmentation=Segmentation(),
+        recipe=None,
+        widths_mm={f"step_{number}.png": width_mm for number, width_mm in enumerate(widths_mm)},
+        out=tmp_path / "out",
+        stages=False,
+        jobs=1,
+        sequence=True,
+    )
+    assert analyze(request, lambda: None).measured == 4
+    rows = read_table(tmp_path / "out" / "curve.csv")
+    assert [(row["image"], row["width_mm"], row["area_px"], row["press"]) for row in rows] == [
+        ("step_1.png", "40.06", "60", "1"),
+        ("step_0.png", "40.04", "50", "1"),
+        ("step_2.png", "39.02", "100", "1"),
+        ("step_3.png", "38", "120", "1"),
+    ]
 
 
 def test_rows_come_in_the_order_given_and_none_is_lost_where_the_run_ends_early(tmp_path: Path):
