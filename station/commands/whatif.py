@@ -2,13 +2,14 @@
 
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
 
 from station.config_option import config_option
 from station.errors import BadInputError, StationError
-from station.recipe_store.difference import differences
+from station.recipe_store.difference import Difference, differences
 from station.records.database import reading, records_folder
 from station.records.marks import Mark, read_marked
 from station.settings.configuration import load_configuration
@@ -20,7 +21,7 @@ from station.whatif.page import MOST_SHOWN, Page, as_json, fruit_views, render
 from station.whatif.progress_file import ProgressFile
 from station.whatif.replay import Replayed, recipe_of_snapshot
 from station.whatif.runner import batches, run
-from station.whatif.stored import sequences, snapshots
+from station.whatif.stored import sequences, snapshots_of
 
 
 @click.command("whatif")
@@ -49,7 +50,8 @@ def whatif(
     site = load_configuration(config)
     draft, folder = find_recipe(recipe_name, site.recipes_folder), records_folder(site.home)
     with reading(folder) as connection:
-        wanted, own = sequences(connection, draft.name, lots, last), snapshots(connection, draft.name)
+        wanted = sequences(connection, draft.name, lots, last)
+        own = snapshots_of(connection, wanted)
         marks: dict[int, Mark] = {each.sequence: each.mark for each in read_marked(connection)}
     if not wanted:
         raise BadInputError(f"no judged inspection of {draft.name} is in {folder}" + _of(lots))
@@ -84,18 +86,27 @@ def _page(
     draft: Recipe,
     lots: tuple[str, ...],
 ) -> str:
-    known = [recipe for text in own.values() if (recipe := recipe_of_snapshot(text)) is not None]
-    single = known[-1] if known else None
+    recipes = {sha256: recipe_of_snapshot(text) for sha256, text in own.items()}
     changed = [each for each in results if each.changes_side]
     with reading(folder) as connection:
-        tiles = fruit_views(connection, folder, changed[:MOST_SHOWN], single if len(known) == 1 else None, draft)
+        tiles = fruit_views(connection, folder, changed[:MOST_SHOWN], recipes, draft)
     facts = [
         ("draft", f"{draft.title}, {content_sha256(draft)[:12]}"),
         ("inspections", f"{results[0].sequence} to {results[-1].sequence}{_of(lots)}"),
         ("recipes at the time", ", ".join(sha256[:12] for sha256 in own)),
     ]
-    changes = () if single is None else differences(single, draft)
+    changes = _changes(list(recipes.values()), draft)
     return render(Page(f"What if: {draft.title}", facts, changes, told, against, tiles, len(changed)))
+
+
+def _changes(recipes: Sequence[Recipe | None], draft: Recipe) -> Sequence[Difference] | str:
+    """Return what the draft changes of the recipe of all fruit; in words why it is not known."""
+    if len(recipes) > 1:
+        return f"These fruit were inspected by {len(recipes)} revisions, so there is no single one to compare with."
+    (own,) = recipes
+    if own is None:
+        return "Not known: this version does not accept the recipe by which these fruit were inspected."
+    return differences(own, draft)
 
 
 def _of(lots: tuple[str, ...]) -> str:

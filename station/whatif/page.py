@@ -1,7 +1,7 @@
 """Report of a what-if: one HTML file with its pictures inside, readable without network and station."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,8 @@ from sqlalchemy import Connection
 from station.calibration.gate import gated
 from station.charts.area_chart import Curve, Limit, Size, Texts, area_chart, report_style
 from station.charts.report import data_uri, templates
+from station.inspection.press import Press
+from station.inspection.sized_limits import sized_limits
 from station.recipe_store.difference import Difference
 from station.records.images import image_path
 from station.settings.recipe_model import Recipe
@@ -23,7 +25,7 @@ from station.vision.press import PressTracker
 from station.whatif.against_marks import Compared
 from station.whatif.outcome_table import AFTER, BEFORE, Counted
 from station.whatif.replay import Replayed
-from station.whatif.stored import read_gate_factor
+from station.whatif.stored import read_gate_factor, read_stored
 
 MOST_SHOWN = 60
 _CHART = Size(300, 200, 12)
@@ -37,7 +39,7 @@ class FruitView:
 
     result: Replayed
     chart: Markup
-    """Area over closing, with the limits at the time of the inspection and the draft's."""
+    """Area over closing, with the limits at the time of the inspection and the draft's, for the fruit's size."""
     picture: str
     """A data URI of its last image with the contact's outline; empty if none was stored."""
 
@@ -48,7 +50,8 @@ class Page:
 
     title: str
     facts: Sequence[tuple[str, str]]
-    changes: Sequence[Difference]
+    changes: Sequence[Difference] | str
+    """What the draft changes of the recipe of all fruit; in words why it is not known."""
     counted: Counted
     against: Compared | None
     """Comparison with people's marks; None if no fruit is marked."""
@@ -64,20 +67,41 @@ def render(page: Page) -> str:
 
 
 def fruit_views(
-    connection: Connection, folder: Path, results: Sequence[Replayed], own: Recipe | None, draft: Recipe
+    connection: Connection,
+    folder: Path,
+    results: Sequence[Replayed],
+    recipes: Mapping[str, Recipe | None],
+    draft: Recipe,
 ) -> list[FruitView]:
-    """Read the views of some fruit, in the page's order; `own` gives their limits, None if they had several recipes."""
-    return [_fruit_view(connection, folder, result, own, draft) for result in results]
+    """Read the views of some fruit, in the page's order.
+
+    Args:
+        recipes: that they were judged by, by their hash; None for one that this program does not accept any more.
+    """
+    stored = read_stored(connection, [result.sequence for result in results], folder, with_images=False)
+    limits = {each.sequence: _limits(each.press, recipes[each.recipe_sha256], draft) for each in stored}
+    # One without limits was removed by housekeeping meanwhile.
+    return [_fruit_view(connection, folder, result, limits.get(result.sequence, []), draft) for result in results]
 
 
-def _fruit_view(connection: Connection, folder: Path, result: Replayed, own: Recipe | None, draft: Recipe) -> FruitView:
+def _limits(press: Press, own: Recipe | None, draft: Recipe) -> list[Limit]:
+    """Return a recipe's area limits and the draft's, each for the fruit's size."""
+    both = [(draft, False)] if own is None else [(own, True), (draft, False)]
+    return [
+        Limit(each.closing_mm, each.area_mm2, former=former)
+        for recipe, former in both
+        for each in sized_limits(press, recipe).recipe.damage.area
+    ]
+
+
+def _fruit_view(
+    connection: Connection, folder: Path, result: Replayed, limits: Sequence[Limit], draft: Recipe
+) -> FruitView:
     rows = connection.exec_driver_sql(
         "SELECT closing_mm, area_mm2 FROM curve_points WHERE sequence = ? AND closing_mm IS NOT NULL "
         "AND area_mm2 IS NOT NULL ORDER BY step",
         (result.sequence,),
     ).all()
-    limits = [Limit(each.closing_mm, each.area_mm2, former=True) for each in own.damage.area] if own else []
-    limits += [Limit(each.closing_mm, each.area_mm2) for each in draft.damage.area]
     curves = [Curve("own", [(row[0], row[1]) for row in rows])]
     if result.areas_mm2:
         curves.append(Curve("again", [(row[0], area) for row, area in zip(rows, result.areas_mm2, strict=False)]))

@@ -84,6 +84,26 @@ def snapshots(connection: Connection, name: str) -> dict[str, str]:
     return dict(tuple(row) for row in found)
 
 
+def snapshots_of(connection: Connection, wanted: Sequence[int]) -> dict[str, str]:
+    """Return the recipes that some inspections were judged by, canonical JSON by their hash, by their first fruit.
+
+    Args:
+        wanted: their sequences, ascending.
+    """
+    if not wanted:
+        return {}
+    judged = connection.exec_driver_sql(
+        "SELECT sequence, recipe_sha256 FROM inspections WHERE sequence BETWEEN ? AND ? ORDER BY sequence",
+        (wanted[0], wanted[-1]),
+    )
+    chosen = set(wanted)
+    hashes = tuple(dict.fromkeys(sha256 for sequence, sha256 in judged if sequence in chosen))
+    marks = ", ".join("?" * len(hashes))
+    query = f"SELECT sha256, text FROM recipe_snapshots WHERE sha256 IN ({marks})"  # noqa: S608 (marks)
+    texts = dict(tuple(row) for row in connection.exec_driver_sql(query, hashes))
+    return {sha256: texts[sha256] for sha256 in hashes}
+
+
 def read_stored(connection: Connection, wanted: Sequence[int], folder: Path, *, with_images: bool) -> list[StoredPress]:
     """Read some hundred inspections, in ascending order, with their curves, and also their images if wanted."""
     marks = ", ".join("?" * len(wanted))

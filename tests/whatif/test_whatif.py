@@ -12,6 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from station.commands.whatif import _changes
 from station.errors import StationError
 from station.inspection.fruit_size import NO_SIZE, FruitSize
 from station.inspection.judge import judge
@@ -19,12 +20,14 @@ from station.messages import whatif as messages
 from station.messages.judge import AREA_NEAR, INTERNAL_FAULT, STEPS_ENDED
 from station.messages.message import VERBATIM, verbatim
 from station.records.database import FILE_NAME, reading
+from station.settings.recipe import find_recipe
 from station.vocabulary import Reason
 from station.whatif import runner
 from station.whatif.outcome_table import as_csv, counted
+from station.whatif.page import fruit_views
 from station.whatif.progress_file import ProgressFile
 from station.whatif.replay import Replayed, replay
-from station.whatif.stored import StoredPress, read_stored
+from station.whatif.stored import StoredPress, read_stored, snapshots_of
 
 SOUND, BRUISED, BETWEEN = 27.0, 45.0, 33.5
 
@@ -189,6 +192,51 @@ def test_the_command_shows_which_fruit_change_sides_and_goes_on_where_it_was(orc
     code, told = station("whatif", "--recipe", draft(damage__area__0__area_mm2=91.0), "--out", out)
     assert code == 2
     assert "it holds the results of another draft" in told
+
+
+def test_the_draft_is_compared_with_the_revision_that_inspected_these_fruit(orchard, draft, changed, station, tmp_path):
+    made = orchard.store([orchard.press(SOUND)], "A")
+    other = replace(orchard, recipe=changed(orchard.recipe, damage__area__0__area_mm2=100.0))
+    made += other.store([orchard.press(SOUND)], "B")
+    with reading(orchard.folder) as connection:
+        first, second = snapshots_of(connection, made)
+        assert list(snapshots_of(connection, made[1:])) == [second]
+    file, pages = draft(damage__area__0__area_mm2=90.0), {}
+    for name, lots in (("A", ("--lots", "A")), ("B", ("--lots", "B")), ("both", ())):
+        assert station("whatif", "--recipe", file, *lots, "--out", tmp_path / name, "--jobs", 1)[0] == 0
+        pages[name] = (tmp_path / name / "whatif.html").read_text()
+    assert "damage.area[0].area_mm2: 112.0 → 90.0" in pages["A"]
+    assert "damage.area[0].area_mm2: 100.0 → 90.0" in pages["B"]
+    assert "were inspected by 2 revisions" in pages["both"]
+    assert "damage.area[0].area_mm2:" not in pages["both"]
+    shown = {name: (first[:12] in page, second[:12] in page) for name, page in pages.items()}
+    assert shown == {"A": (True, False), "B": (False, True), "both": (True, True)}
+
+
+def test_a_recipe_that_is_not_accepted_any_more_is_compared_with_nothing(orchard):
+    assert "does not accept" in str(_changes([None], orchard.recipe))
+    assert _changes([orchard.recipe], orchard.recipe) == ()
+
+
+def test_each_fruit_is_drawn_beside_the_limits_for_its_size(orchard, changed, monkeypatch):
+    recipe = find_recipe("strawberry")
+    assert recipe.damage.size is not None
+    (sequence,) = replace(orchard, recipe=recipe).store([replace(orchard.press(SOUND), size=FruitSize(36.0))])
+    drawn = []
+    monkeypatch.setattr("station.whatif.page.area_chart", lambda _curves, limits, *_, **__: drawn.extend(limits) or "")
+    draft = changed(recipe, damage__area__1__area_mm2=110.0)
+    result = Replayed(sequence, "A", "PASS", "FAIL", None, faithful=True)
+    with reading(orchard.folder) as connection:
+        recipes = dict.fromkeys(snapshots_of(connection, [sequence]), recipe)
+        assert len(fruit_views(connection, orchard.folder, [result], recipes, draft)) == 1
+        assert fruit_views(connection, orchard.folder, [], recipes, draft) == []
+    factor = (36.0 / recipe.damage.size.reference_mm) ** recipe.damage.size.exponent
+    assert factor < 0.9
+    assert [(each.former, each.closing_mm, each.area_mm2) for each in drawn] == [
+        (former, each.closing_mm, pytest.approx(factor * each.area_mm2))
+        for former, of in ((True, recipe), (False, draft))
+        for each in of.damage.area
+    ]
 
 
 def test_two_processes_and_a_cluster_say_the_same_as_one(orchard, draft, station, apart, cluster, tmp_path):
