@@ -93,6 +93,7 @@ def pressed_otherwise(own: Recipe, draft: Recipe) -> Message | None:
         "steps.start_width_mm": (own.steps.start_width_mm, draft.steps.start_width_mm),
         "steps.step_mm": (own.steps.step_mm, draft.steps.step_mm),
         "steps.measured": (own.steps.measured, draft.steps.measured),
+        "press.centre_from_mm": (own.press.centre_from_mm, draft.press.centre_from_mm),
     }
     other = [name for name, (before, after) in pairs.items() if before != after]
     return messages.PRESSES_OTHERWISE(fields=", ".join(other)) if other else None

@@ -91,6 +91,7 @@ def test_a_curve_that_was_stopped_early_does_not_tell_what_would_have_come(orcha
             {"gripper__speed_mm_s": 30.0, "imaging__settle_s": 0.5},
             messages.PRESSES_OTHERWISE(fields="gripper, imaging"),
         ),
+        ({"press": {"centre_from_mm": 2.5}}, messages.PRESSES_OTHERWISE(fields="press.centre_from_mm")),
         ({"segmentation__robust__gate_ratio": 4.0}, messages.IMAGES_NOT_KEPT()),
         ({"segmentation__robust__least_confidence": 0.3}, messages.IMAGES_NOT_KEPT()),
     ],
