@@ -11,7 +11,7 @@ FIRST_IMAGES_NOT_KEPT = define(
 )
 IMAGES_NOT_KEPT = define("whatif.images_not_kept", "the draft measures otherwise, and not all of its images were kept")
 OTHER_ONSET = define(
-    "whatif.other_onset", "the draft sees no contact at the stored onset, so its steps would be others"
+    "whatif.other_onset", "the draft finds another onset than the stored one, so its steps would be others"
 )
 OTHER_PROGRAM = define(
     "whatif.other_program", "its images do not give its stored areas: they were measured by another program"

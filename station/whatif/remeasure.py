@@ -44,20 +44,23 @@ def remeasured(stored: StoredPress, own: Segmentation, draft: Segmentation) -> P
     if reference is None or missing:
         raise CannotRemeasureError(messages.IMAGES_NOT_KEPT())
     before, after = (PressTracker(make_method([reference], one)) for one in (own, draft))
-    points = [_point(press, step, decoded, before, after, draft) for step in range(len(press.points))]
-    if not points or points[0].area_px == 0:
+    measured = [_measured(press, step, decoded, before, after, draft) for step in range(len(press.points))]
+    # The station counts the closing from the first firm contact, never from a weak one.
+    onset = next((step for step, (_, is_firm) in enumerate(measured) if is_firm), None)
+    if onset is None or press.points[onset].closing_mm != 0:
         raise CannotRemeasureError(messages.OTHER_ONSET())
-    return replace(press, points=tuple(points))
+    return replace(press, points=tuple(point for point, _ in measured))
 
 
-def _point(
+def _measured(
     press: Press,
     step: int,
     decoded: Mapping[int | None, Image],
     before: PressTracker,
     after: PressTracker,
     draft: Segmentation,
-) -> Measured:
+) -> tuple[Measured, bool]:
+    """Return a step as the draft measures it, and whether its contact is firm."""
     stored = press.points[step]
     then, now = before.measure_step([decoded[step]]), after.measure_step([decoded[step]])
     if abs(then.area_px - stored.area_px) > max(_SAME_PX, _SAME_AREA * stored.area_px):
@@ -70,7 +73,7 @@ def _point(
     flags = set(now.flags)
     if confidence is not None and confidence < draft.robust.least_confidence:
         flags.add(Flag.LOW_CONFIDENCE)
-    return Measured(stored.closing_mm, area_mm2, now.area_px, confidence, frozenset(flags))
+    return Measured(stored.closing_mm, area_mm2, now.area_px, confidence, frozenset(flags)), now.is_firm
 
 
 def _scale(press: Press) -> float:
