@@ -28,8 +28,9 @@ def wrong_frames(
     """The fewest frames without which the area never shrinks, within noise, while the width does.
 
     The longest run of frames that fit each other is kept (longest non-decreasing subsequence with a tolerance) and
-    the rest is named. Of two runs of one length the one with the later frames is kept, since onset frames are the
-    least certain. Opening again starts nothing new: only frames narrower than all before them are judged.
+    the rest is named. Of several of one length one that ends last is kept, since onset frames are the least certain,
+    and of those the one with the earlier frames. Opening again starts nothing new: only frames narrower than all before
+    them are judged.
 
     Args:
         widths_mm: measured gripper widths, in the order of the frames.
@@ -75,23 +76,21 @@ def _narrower_than_before(widths_mm: Sequence[float]) -> list[int]:
 
 
 def _longest_run(values: npt.NDArray[np.float64], floors: npt.NDArray[np.float64]) -> list[int]:
-    """Places of the longest run in which no value falls below the floor of one before it.
+    """Places of the longest run in which no value falls below the floor of one before it, the last one first.
 
-    Dynamic programming over the run's last place, in quadratic time.
+    Dynamic programming over the run's last place and its length, in quadratic time: of all runs of one length the one
+    with the lowest highest floor is continued by whatever continues another.
     """
-    lengths = np.ones(values.size, np.int64)
-    highest_floor = floors.copy()
-    before = np.full(values.size, -1)
+    lowest = np.full(values.size + 1, np.inf)  # the lowest highest floor of the runs so far, by their length
+    lowest[0] = -np.inf
+    ending = np.full((values.size, values.size + 1), np.inf)  # likewise of those that end at a place
     for place, value in enumerate(values):
-        fitting = np.where(value >= highest_floor[:place], lengths[:place], 0)
-        if fitting.any():
-            best = int(fitting.argmax())
-            before[place] = best
-            lengths[place] += lengths[best]
-            highest_floor[place] = max(highest_floor[best], floors[place])
-    if not values.size:
-        return []
-    run = [values.size - 1 - int(lengths[::-1].argmax())]
-    while before[run[-1]] >= 0:
-        run.append(int(before[run[-1]]))
+        ending[place, 1:] = np.where(value >= lowest[:-1], np.maximum(lowest[:-1], floors[place]), np.inf)
+        lowest = np.minimum(lowest, ending[place])
+    run, end, least_after = list[int](), values.size, values.max(initial=0.0)
+    for length in range(int(np.flatnonzero(lowest < np.inf)[-1]), 0, -1):
+        fitting = np.flatnonzero(ending[:end, length] <= least_after)
+        end = int(fitting[0] if run else fitting[-1])
+        run.append(end)
+        least_after = min(least_after, values[end])
     return run

@@ -1,5 +1,7 @@
 """The check that an area does not shrink while the gripper closes."""
 
+from itertools import combinations
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -38,7 +40,12 @@ def test_an_area_may_fall_by_a_twentieth(area, wrong):
 
 
 def test_many_small_falls_are_no_noise_together():
-    assert [frame.index for frame in wrong_frames([20, 19, 18], [100, 96, 92])] == [2]
+    assert [frame.index for frame in wrong_frames([20, 19, 18], [100, 96, 92])] == [0], "the later two fit each other"
+
+
+def test_the_frame_that_is_too_large_is_named_and_not_those_that_fit_each_other():
+    (wrong,) = wrong_frames([5, 4, 3, 2, 1], [100, 90, 96, 94, 99])
+    assert (wrong.index, wrong.area) == (0, 100)
 
 
 def test_no_fall_of_a_small_area_is_noise_by_itself():
@@ -62,15 +69,36 @@ def test_what_cannot_be_compared_is_refused():
         wrong_frames([1.0], [float("nan")])
 
 
+def longest(areas: list[float], floors: dict[int, float], places: list[int], most: float) -> int:
+    """The length of the longest run among the places whose floors are at most so much."""
+    lowest = [float("-inf")]
+    for place in places:
+        if floors[place] > most:
+            continue
+        for length in reversed([length for length, floor in enumerate(lowest) if areas[place] >= floor]):
+            highest = max(lowest[length], floors[place])
+            lowest[length + 1 :] = [min([highest, *lowest[length + 1 : length + 2]]), *lowest[length + 2 :]]
+    return len(lowest) - 1
+
+
 def plainly(widths: list[float], areas: list[float], relative: float, least: float) -> list[WrongFrame]:
-    """The definition written out, without a thought for its cost: every run is kept whole."""
+    """The definition written out, without a thought for its cost: a frame is kept if a longest run goes on before it.
+
+    The last one is the latest such frame, and each before it the earliest.
+    """
     closing = [place for place, width in enumerate(widths) if all(width < earlier for earlier in widths[:place])]
     slack = {place: max(least, relative * areas[place]) for place in closing}
-    runs: list[list[int]] = []
-    for place in closing:
-        fitting = [run for run in runs if all(areas[place] >= areas[k] - slack[k] for k in run)]
-        runs.append([*max(fitting, key=len, default=[]), place])
-    kept = max(reversed(runs), key=len, default=[])
+    floors = {place: areas[place] - slack[place] for place in closing}
+    kept, most = list[int](), float("inf")
+    for length in reversed(range(longest(areas, floors, closing, most))):
+        before = [place for place in closing if not kept or place < kept[0]]
+        fitting = [
+            place
+            for number, place in enumerate(before)
+            if floors[place] <= most and longest(areas, floors, before[:number], min(most, areas[place])) >= length
+        ]
+        kept.insert(0, fitting[0] if kept else fitting[-1])
+        most = min(most, areas[kept[0]])
     return [
         WrongFrame(
             place,
@@ -98,3 +126,20 @@ def test_the_result_is_the_definitions(steps, relative, least):
 def test_the_result_is_the_definitions_while_it_closes(areas, relative, least):
     widths = [50.0 - step for step in range(len(areas))]
     assert wrong_frames(widths, areas, relative, least) == plainly(widths, areas, relative, least)
+
+
+@given(st.lists(AREAS, max_size=8), st.sampled_from([0.0, 0.05, 0.3]), st.sampled_from([0.0, 5.0]))
+def test_no_other_frames_of_the_same_number_or_fewer_would_be_enough_or_come_first(areas, relative, least):
+    """Of all sets of frames that fit each other: the largest, of these one that ends last, then the earliest frames."""
+    floors = [area - max(least, relative * area) for area in areas]
+
+    def fit(places: tuple[int, ...]) -> bool:
+        return all(areas[later] >= floors[place] for place, later in combinations(places, 2))
+
+    def order(places: tuple[int, ...]) -> tuple[int, ...]:
+        return len(places), *places[-1:], *(-place for place in places[-2::-1])
+
+    every = (places for number in range(len(areas) + 1) for places in combinations(range(len(areas)), number))
+    kept = max(filter(fit, every), key=order)
+    named = [frame.index for frame in wrong_frames([50.0 - step for step in range(len(areas))], areas, relative, least)]
+    assert named == [place for place in range(len(areas)) if place not in kept]
