@@ -25,7 +25,7 @@ from station.settings.segmentation import Segmentation
 from station.vision.contact import Contact, Image
 from station.vision.methods import make_method
 from station.vision.quality import DenoisingQuality, denoising_quality
-from station.vision.scale import Scale
+from station.vision.scale import TYPICAL_MM_PER_PX, TYPICAL_UNCERTAINTY, Scale
 from station.vocabulary import Flag
 
 _THUMBNAIL_PX = 220
@@ -53,6 +53,8 @@ class Request:
     """Of the unit that took the images; None if unknown."""
     sequence: bool = False
     """The images are the steps of one press, in the order given."""
+    site_mm_per_px: float = TYPICAL_MM_PER_PX
+    """Scale of the site's camera, for a unit whose calibration has not measured it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +95,7 @@ def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
     _check_widths(request)
     references = [decoded.image for decoded in request.references]
     shape = references[0].shape
-    scale = _scale(request.calibration, shape[0], shape[1])
+    scale = _scale(request, shape[0], shape[1])
     order = _order(request)
     found: dict[int, _Summary | Refused] = {}
     with OutputFolder(request.out) as output:
@@ -250,11 +252,17 @@ def _on_curve(press: PressCurve) -> Iterator[ReportRow]:
         yield replace(row, closing_mm=point.closing_mm, flags=flags)
 
 
-def _scale(calibration: Calibration | None, height_px: int, width_px: int) -> Scale:
-    """Return the scale of images of the whole field, by the unit's calibration or the typical one."""
+def _scale(request: Request, height_px: int, width_px: int) -> Scale:
+    """Return the scale of images of the whole field: the one that the station measures the unit by, else the typical.
+
+    A calibration at one place has measured no scale.
+    """
+    calibration = request.calibration
     if calibration is None:
         return Scale.typical(height_px, width_px)
     smaller = max(calibration.height_px, calibration.width_px) / max(height_px, width_px)
+    if not calibration.scale_measured:
+        return Scale(request.site_mm_per_px * smaller, TYPICAL_UNCERTAINTY)
     return Scale(calibration.mm_per_px * smaller, calibration.scale_uncertainty)
 
 
@@ -263,6 +271,8 @@ def _facts(request: Request, scale: Scale, order: Sequence[Run]) -> list[tuple[s
     converted = sorted({text for decoded in request.references for text in decoded.conversions})
     known = request.calibration
     whose = "typical" if known is None else f"calibration {known.id} of {known.serial}"
+    if known is not None and not known.scale_measured:
+        whose = f"not measured by {whose}"
     parameters = request.segmentation.paper if request.segmentation.method == "paper" else request.segmentation.robust
     return [
         ("Method", request.segmentation.method),

@@ -87,6 +87,7 @@ def analyze_command(
         jobs=jobs,
         calibration=calibration,
         sequence=sequence,
+        site_mm_per_px=site.camera.mm_per_px,
     )
     with click.progressbar(
         length=len(listing.sources), label="measuring", file=sys.stderr, hidden=not sys.stderr.isatty()

@@ -16,6 +16,8 @@ import cv2
 import numpy as np
 import pytest
 
+from station.calibration.model import Calibration, FieldMap, Noise
+from station.calibration.store import CalibrationStore
 from tests.tables import read_table
 
 WITHOUT_COVERAGE = {name: value for name, value in os.environ.items() if not name.startswith("COV")}
@@ -43,6 +45,33 @@ def test_a_folder_gives_rows_masks_sheet_and_report(press, analyze_apart, tmp_pa
         assert row["contact"] == "1"
     assert (out / "contact_sheet.png").exists()
     assert not (out / "stages").exists()
+
+
+@pytest.mark.parametrize(
+    ("measured", "mm_per_px", "whose"),
+    [(False, 0.0255, ", not measured by calibration "), (True, 0.028, ", calibration ")],
+)
+def test_a_unit_whose_calibration_measured_no_scale_has_the_sites_as_at_the_station(
+    press, analyze, tmp_path, monkeypatch, measured, mm_per_px, whose
+):
+    monkeypatch.setenv("STATION_HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("STATION_CAMERA_MM_PER_PX", "0.0255")
+    calibration = Calibration(
+        id="20260102T030405Z", serial="D20001", unit="digit", operator="anna", simulated=True, program="0",
+        ball_mm=24.0, holder_mm=18.0, width_px=240, height_px=320, mm_per_px=0.028,
+        scale_uncertainty=0.02, scale_measured=measured, places=(), curve=(), onset_mm=42.0, zero_mm=0.0,
+        noise=Noise(pixel_levels=(1.0, 1.0, 1.0), gate=0.5, gate_factor=1.0, drift_levels=1.0),
+        light_levels=(90.0, 90.0, 90.0), sharpness_levels=2.0,
+        field=FieldMap(rows=1, columns=1, light_levels=((90.0, 90.0, 90.0),), noise_levels=(1.0,)), checks=(),
+    )  # fmt: skip
+    CalibrationStore(tmp_path / "home").add_calibration(calibration, {})
+    out = tmp_path / "out"
+    image = press.folder / "frame_10.png"
+    done = analyze("--reference", press.reference, "--method", "paper", "--unit", "D20001", "--out", out, image)
+    assert done.returncode == 0, done.stderr
+    (row,) = read_table(out / "results.csv")
+    assert float(row["area_mm2"]) == pytest.approx(int(row["area_px"]) * mm_per_px**2, rel=1e-3)
+    assert f"{mm_per_px:.4f} mm per pixel{whose}{calibration.id} of D20001" in (out / "report.html").read_text()
 
 
 def test_widths_add_closing_curve_and_plot(press, analyze, tmp_path):
