@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from station.studies.gauge_grip import CALIBRATION_SD
 from station.twin.contact import Pose
 from station.twin.damage import DAMAGES, Severity
 from station.twin.fruit import Fruit, Kind, draw_fruit
@@ -26,9 +27,6 @@ _PLACE_PX, _TURN_DEG, _TILT_DEG = 19.0, 5.0, 2.0
 """As the gauge study draws an operator's set-up and how a fruit is laid in; here both anew for each fruit."""
 _SCALES_MM_PER_PX = (0.0255, 0.0291)
 """What is published for single DIGIT units."""
-CALIBRATION_SD = 0.011
-"""Relative error of a calibrated scale: half the ± 2.2 %, two standard deviations, that `station calibrate` states at
-three places (docs/calibration.md)."""
 _GRADER_MM = 1.0
 """A grader's length is within this of the true one, uniform."""
 

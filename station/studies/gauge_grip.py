@@ -28,6 +28,9 @@ _APPROACH_MM = 2.0
 _MOST_COUNTS = 40
 _HELD_S = 2.0
 _OPEN_BY_MM = 20.0
+CALIBRATION_SD = 0.011
+"""Relative standard uncertainty of a calibrated scale: half the ± 2.2 %, two standard deviations, that `station
+calibrate` states at three places (docs/calibration.md)."""
 
 GoesOn = Callable[[float, Contact], bool]
 """Gets a step's closing, mm, and its contact; says whether another step is to be made."""
@@ -151,7 +154,13 @@ class Grip:
             untouched = Press(None, 0.0, ())
             return Pressed(untouched, untouched, None)
         enough_mm = last_limit_mm(self._recipe) + self._recipe.steps.step_mm - self._rig.finest_step_mm
-        press = Press(onset.width_mm + zero_mm, onset.uncertainty_mm, ())
+        press = Press(
+            onset.width_mm + zero_mm,
+            onset.uncertainty_mm,
+            (),
+            resolution_mm=self._rig.finest_step_mm,
+            scale_uncertainty=CALIBRATION_SD,
+        )
         stopped: Press | None = None
 
         def goes_on(closing_mm: float, contact: Contact) -> bool:

@@ -10,12 +10,13 @@ from click.testing import CliRunner, Result
 
 from station.commands.grr import grr
 from station.errors import BadInputError, StationError
+from station.inspection.judge import judge
 from station.settings.recipe import find_recipe
 from station.studies import gauge_design, gauge_dummies
 from station.studies import grr as grr_room
 from station.studies.gauge_design import TwinDesign, study_on_twin
 from station.studies.gauge_dummies import measure_dummy, stop_mm
-from station.studies.gauge_grip import last_limit_mm
+from station.studies.gauge_grip import CALIBRATION_SD, FruitRig, Grip, last_limit_mm
 from station.studies.gauge_report import render, tolerance_percents
 from station.studies.gauge_table import Measurement, read_measurements
 from station.studies.gauge_twin import (
@@ -211,6 +212,16 @@ def test_a_flagged_reading_is_made_again(monkeypatch: pytest.MonkeyPatch):
     assert len(pressed) == 3 + 5
     assert len(set(pressed)) == len(pressed)
     assert pressed == pytest.approx([stop_mm("strawberry")] * len(pressed), abs=0.1)
+
+
+def test_a_gauge_press_is_judged_with_the_uncertainty_of_gripper_and_scale():
+    task, recipe = GaugeTask("blueberry", 3, 0, 0, 0), find_recipe("blueberry")
+    rig = FruitRig(part_of(task), pose_of(task), None, 5)
+    pressed = Grip(recipe, rig).press(0.3, 0.0)
+    for press in (pressed.as_stopped, pressed.on_to_the_threshold):
+        standard = {each.name: each.standard for each in judge(press, recipe).budget.components}
+        assert standard["gripper"] == pytest.approx(rig.finest_step_mm / np.sqrt(12))
+        assert standard["scale"] == CALIBRATION_SD > 0
 
 
 def test_the_twin_s_measurement_is_the_station_s(tmp_path: Path):
