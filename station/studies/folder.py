@@ -19,7 +19,13 @@ _DRAWN_BY = (
         for name in ("contact.py", "damage.py", "fruit.py", "gel.py", "squeeze.py", "texture.py", "digit")
     ),
 )
-_MEASURED_BY = {"paper": ("vision/paper.py", "vision/methods.py"), "robust": ("vision",)}
+_MEASURED_BY = {
+    "paper": tuple(
+        f"vision/{name}"
+        for name in ("paper.py", "methods.py", "median.py", "contact.py", "working.py", "step.py", "press.py")
+    ),
+    "robust": ("vision",),
+}
 """Code that decides a sample's numbers, relative to the package."""
 
 

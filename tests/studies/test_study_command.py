@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+import station
 from station.commands.study import study
 from station.errors import BadInputError
 from station.studies.folder import StudyFolder, identity_of
@@ -77,6 +79,22 @@ def test_what_is_stored_is_not_measured_again_and_what_is_torn_is(tmp_path: Path
     assert done.samples[0].weight_g == 99.0
     assert done.samples[1] == measure_sample(TASK._replace(number=2))
     assert folder.stored(2) == done.samples[1]
+
+
+@pytest.mark.parametrize("name", ["paper", "methods", "median", "contact", "working", "step", "press", "robust"])
+def test_a_study_is_another_one_where_the_code_that_measures_it_is_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+):
+    """Without the code of `robust` a sample by `paper` is measured as before."""
+    for folder in ("studies", "twin", "vision"):
+        shutil.copytree(Path(station.__file__).parent / folder, tmp_path / folder)
+    monkeypatch.setattr(station, "__file__", str(tmp_path / "__init__.py"))
+    tasks = [TASK._replace(method=method) for method in ("paper", "robust")]
+    before = [identity_of(task) for task in tasks]
+    with (tmp_path / "vision" / f"{name}.py").open("a") as file:
+        file.write("# another line\n")
+    paper, robust = (identity_of(task) == same for task, same in zip(tasks, before, strict=True))
+    assert (paper, robust) == (name == "robust", False)
 
 
 def test_an_interrupted_study_keeps_what_it_measured(tmp_path: Path):
