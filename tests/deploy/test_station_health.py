@@ -19,7 +19,7 @@ def answering(answers):
             self.end_headers()
             self.wfile.write(json.dumps(body).encode())
 
-        def log_message(self, *_words):
+        def log_message(self, format, *args):  # noqa: A002 (the base's name)
             pass
 
     with http.server.HTTPServer(("127.0.0.1", 0), Handler) as server:

@@ -38,11 +38,16 @@ def test_it_is_the_triggers_also_after_a_start(opened, scenario, trigger, passed
         standing=standing, trigger=trigger, record=lambda: record, seen=[], limits=SimpleNamespace(inspection_s=15.0),
         active=SimpleNamespace(recipe=find_recipe("strawberry"), snapshot=trigger.recipe),
     )  # fmt: skip
-    recent, again = RecentInspections(), RecentInspections()
-    recent.add(now)
-    again.restore(*read_recent(folder, lambda _recipe: 15.0))
-    for known in (recent, again):
-        assert known.counts(LOT).unjudged == 1
-        assert known.counts(None).unjudged == 0
-        assert [each.lot for each in known.recent(9)] == [LOT]
-        assert known.fruit(standing.sequence).short.lot == LOT
+
+    async def seen():
+        recent, again = RecentInspections(lambda _lot, _below: {}), RecentInspections(lambda _lot, _below: {})
+        recent.add(now)
+        again.restore(*read_recent(folder, lambda _recipe: 15.0))
+        for known in (recent, again):
+            assert known.counts(LOT).unjudged == 1
+            assert known.counts("").unjudged == 0
+            assert [each.lot for each in known.recent(9)] == [LOT]
+            assert known.fruit(standing.sequence).short.lot == LOT
+            await known.close()
+
+    scenario(seen)

@@ -13,7 +13,9 @@ def result(outcome, flags):
     block["status"] = BY_NAME["status"].flags(["result_valid"])
     block["result_outcome"] = BY_NAME["result_outcome"].code(outcome)
     block["result_flags"] = BY_NAME["result_flags"].flags(flags)
-    return published_result(block)
+    published = published_result(block)
+    assert published is not None
+    return published
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from station.inspection.alarm_table import AlarmId
 from station.messages import gripper as gripper_messages
 from station.messages.message import message_of, verbatim
 from station.messages.operation import INTERFACE_SILENT
-from station.records.model import AlarmRow
+from station.records.model import StoredAlarm
 from station.runtime.alarms.manager import OF_DEVICE, AlarmManager
 from station.runtime.devices.manager import ARM, CAMERA, GRIPPER
 from station.runtime.observability.metrics import Metrics
@@ -68,7 +68,7 @@ def test_only_an_arm_that_does_not_answer_has_the_alarm_of_its_network_cable(cau
 def test_the_alarms_of_an_arm_that_was_configured_away_end_and_those_that_a_gripper_shares_do_not():
     async def load_alarms():
         shared = (AlarmId.ARM_LINK_LOST, AlarmId.EMERGENCY_STOP, AlarmId.GRIPPER_FAULT)
-        return tuple(AlarmRow(alarm, "acknowledged", 1, 1) for alarm in shared)
+        return tuple(StoredAlarm(alarm, "acknowledged", 1, 1) for alarm in shared)
 
     records: Any = SimpleNamespace(load_alarms=load_alarms, notices=())
     manager = AlarmManager(Metrics("0", 1.0), to_restore=True)

@@ -12,7 +12,7 @@ from station.inspection.alarm_table import AlarmId
 from station.inspection.alarms import CAUSED, AlarmState
 from station.inspection.states import State
 from station.messages import commands
-from station.records.model import AlarmRow
+from station.records.model import StoredAlarm
 from station.records.records import Records
 from station.runtime.devices.manager import GRIPPER
 from station.runtime.production import plc_commands
@@ -264,7 +264,7 @@ def stored(monkeypatch, alarm):
     raised_ms = round(1000 * (time.time() - 60.0))
 
     async def load_alarms(_):
-        return (AlarmRow(alarm, AlarmState.ACKNOWLEDGED, raised_ms, raised_ms),)
+        return (StoredAlarm(alarm, AlarmState.ACKNOWLEDGED, raised_ms, raised_ms),)
 
     monkeypatch.setattr(Records, "load_alarms", load_alarms)
 

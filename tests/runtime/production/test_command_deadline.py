@@ -14,7 +14,7 @@ from station.runtime.production.plc_commands import PlcCommands
 RESET = Command(command=CommandName.RESET, argument=0)
 
 
-def made(state_files=None):
+def made(state_files: Any = None):
     """Return commands of a station that is idle, without devices."""
     service: Any = SimpleNamespace(
         state=State.IDLE, active=None, ending=False, manual_activity=None, allow=lambda: None,
