@@ -190,7 +190,7 @@ class LineProgram:
         status = BY_NAME["status"].names(int(inputs["status"]))
         self._inhibited = "enable_inhibited" in BY_NAME["more_status"].names(int(inputs["more_status"]))
         self._ready = "trigger_ready" in status
-        never_gripped = not inputs["active_recipe"]
+        never_gripped = "online" in status and not inputs["active_recipe"]  # without its station it is 0 too
         self._jaws_open = self._ready or never_gripped
         self._arm_left = "acquiring" not in status or never_gripped
         if not {"writer_owned", "online"} <= status and self.stage is not Stage.CLAIMING:

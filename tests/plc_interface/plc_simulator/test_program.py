@@ -271,6 +271,19 @@ def test_every_fault_is_played_and_every_fruit_is_still_decided_once(fault):
     assert line.cuts == (3 if fault is LineFault.RECONNECT else 0)
 
 
+def test_a_fruit_stays_where_the_station_is_lost_before_its_arm_has_left():
+    station = Station()
+    station.bits.add("acquiring")
+    line = Line(station)
+    assert line.inspect().decision is Decision.PASS
+    assert not line.program.may_move
+    station.bits = {"writer_owned", "acquiring", "error"}
+    station.values["active_recipe"] = 0
+    for _ in range(3):
+        line.scan()
+        assert not line.program.may_move
+
+
 def test_enable_falls_while_the_station_inhibits_it_and_rises_again():
     station = Station()
     line = Line(station)

@@ -357,6 +357,7 @@ class Station:
         self.order = order
         self.words = [0] * (MORE_STATUS[-1].end - STATUS[0].address)
         self.beating = True
+        self.set(packml_mode=BY_NAME["packml_mode"].code("production"))
         self.flags("online", "trigger_ready")
 
     def set(self, **values: float | str | None) -> None:

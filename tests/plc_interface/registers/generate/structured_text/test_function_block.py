@@ -118,6 +118,16 @@ def test_a_fruit_may_be_moved_once_the_arm_has_left_which_is_after_its_result(pl
     assert plc.block["may_move"]
 
 
+@pytest.mark.parametrize("mode", ["maintenance", "manual"])
+def test_no_fruit_may_be_moved_while_a_person_moves_jaws_and_arm(plc, mode):
+    plc.station.set(packml_mode=BY_NAME["packml_mode"].code(mode))
+    plc.scan(3)
+    assert not plc.block["may_move"]
+    plc.station.set(packml_mode=BY_NAME["packml_mode"].code("production"))
+    plc.scan(2)
+    assert plc.block["may_move"]
+
+
 @pytest.mark.parametrize("bits", [("online", "trigger_ready"), ("online", "acquiring")])
 def test_without_the_station_no_fruit_may_be_moved(plc, bits):
     plc.station.flags(*bits)
