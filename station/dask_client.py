@@ -15,7 +15,7 @@ def connect(address: str) -> Any:
     """Connect to a scheduler, and return a `distributed.Client`, which the caller closes.
 
     Args:
-        address: as `tcp://10.0.0.5:8786`.
+        address: as `tcp://10.0.0.5:8786`; TCP if it names no protocol, as Dask has it.
 
     Raises:
         BadInputError: Dask is not installed here, or the address is invalid or does not answer.
@@ -24,6 +24,7 @@ def connect(address: str) -> Any:
         distributed = importlib.import_module("distributed")  # an optional extra, and slow to import
     except ImportError as error:
         raise BadInputError(messages.NO_EXTRA()) from error
+    address = address if "://" in address else f"tcp://{address}"
     _reach(address)
     try:
         return distributed.Client(address, timeout=_TIMEOUT_S)

@@ -9,8 +9,7 @@ JUDGED: Mapping[str, Any] = {
     "damage.growth_mm2_per_mm": 60,
     # The unit is not calibrated and no grader tells a size: by a usual coverage no fruit would pass.
     "damage.size": None,
-    "damage.uncertainty.coverage": 0.6,
-    "damage.uncertainty.repeatability": [{"closing_mm": 3.0, "relative": 0.03}],
+    "damage.uncertainty": {"coverage": 0.6, "repeatability": [{"closing_mm": 3.0, "relative": 0.03}]},
     "early_stop.area_mm2": 150,
     "early_stop.growth_mm2_per_mm": 90,
 }

@@ -22,7 +22,15 @@ def ready(layout: Layout, release: Path) -> bool:
         return False
 
 
-def wait_until_well(layout: Layout, release: Path, version: str, *, was_ready: bool, limit_s: float = LIMIT_S) -> None:
+def wait_until_well(
+    layout: Layout,
+    release: Path,
+    version: str,
+    *,
+    was_ready: bool,
+    needs_records: bool = True,
+    limit_s: float = LIMIT_S,
+) -> None:
     """Wait until the station is alive, has this version, can use its records, and is ready again if it was before.
 
     A station without devices is alive and not ready: on a first start nothing else is to be expected. One that cannot
@@ -32,6 +40,7 @@ def wait_until_well(layout: Layout, release: Path, version: str, *, was_ready: b
         layout: its configuration has the station's address.
         release: the started one.
         was_ready: whether the one before it would have accepted a trigger.
+        needs_records: False for a rollback, which is done when the old release answers.
 
     Raises:
         Failed: it is not healthy by then; with its report.
@@ -39,7 +48,7 @@ def wait_until_well(layout: Layout, release: Path, version: str, *, was_ready: b
     address, deadline_s, trouble = _address(layout, release), time.monotonic() + limit_s, "it does not answer"
     while time.monotonic() < deadline_s:
         try:
-            trouble = _trouble(address, version, was_ready=was_ready)
+            trouble = _trouble(address, version, was_ready=was_ready, needs_records=needs_records)
         except (OSError, http.client.HTTPException, ValueError) as error:
             trouble = f"it does not answer: {error}"
         if not trouble:
@@ -48,7 +57,7 @@ def wait_until_well(layout: Layout, release: Path, version: str, *, was_ready: b
     raise Failed(f"the station is not well {limit_s:g} s after its start: {trouble}")
 
 
-def _trouble(address: tuple[str, int], version: str, *, was_ready: bool) -> str:
+def _trouble(address: tuple[str, int], version: str, *, was_ready: bool, needs_records: bool) -> str:
     status, _ = _get(*address, "/livez")
     if status != http.HTTPStatus.OK:
         return "/livez reports no progress"
@@ -58,6 +67,8 @@ def _trouble(address: tuple[str, int], version: str, *, was_ready: bool) -> str:
     status, answer = _get(*address, "/readyz")
     if was_ready and status != http.HTTPStatus.OK:
         return f"it was ready before and is not now: {answer.get('why')}"
+    if not needs_records:
+        return ""
     faults = (each for each in answer.get("dependencies", ()) if each["name"] == "records" and each["state"] == "fault")
     return next((f"it cannot use its records: {each['detail']}; {each['remedy']}" for each in faults), "")
 

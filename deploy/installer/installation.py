@@ -130,7 +130,9 @@ class Installation:
         before = read_note(self._layout.upgrade)
         # An interrupted upgrade, also to another release, may have changed the file: the earlier note has it as before.
         known = before.get("configuration") if before.get("from") == self._old.name else None
-        text = self._layout.configuration.read_text(encoding="utf-8") if self._changes else known
+        text = known
+        if text is None and self._changes:
+            text = self._layout.configuration.read_text(encoding="utf-8")
         schema = backup.schema_version(copy / backup.RECORDS)
         write_note(self._layout.upgrade, {**note, "copy": copy.name, "schema": schema, "configuration": text})
         point(self._layout.previous, self._old)

@@ -37,16 +37,17 @@ def check_disk_space(layout: Layout, release_bytes: int, *, migrates: bool) -> N
     Args:
         release_bytes: 0 where the release is made already.
         migrates: whether the release brings the records to another schema: it refuses to without room for two copies
-            of the database.
+            of the database, and its rollback needs room for the records as they were.
 
     Raises:
         Refused: they do not.
     """
     records = layout.home / "records"
     kept = [path for path in records.rglob("*") if path.is_file() and "aside" not in path.parts]
-    wanted = [(layout.program, release_bytes), (layout.backups, sum(file.stat().st_size for file in kept))]
-    if migrates:
-        wanted.append((records, 2 * (records / "records.sqlite3").stat().st_size))
+    records_bytes = sum(file.stat().st_size for file in kept)
+    wanted = [(layout.program, release_bytes), (layout.backups, records_bytes)]
+    if migrates:  # and a rollback restores the records beside those that were migrated
+        wanted.append((records, 2 * (records / "records.sqlite3").stat().st_size + records_bytes))
     disks: dict[int, tuple[Path, int]] = {}
     for path, size_bytes in wanted:
         place = next(parent for parent in (path, *path.parents) if parent.is_dir())

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import sqlite3
 from pathlib import Path
 
 from installer import backup, site_files
@@ -23,7 +24,7 @@ def check(layout: Layout) -> None:
     if old is None or not complete(old) or not note:
         raise Refused("there is no upgrade to take back: only the last one can be, and only once")
     copy = layout.backups / str(note["copy"])
-    if not copy.is_dir() and note.get("schema") != backup.schema_version(layout.home / backup.RECORDS):
+    if not copy.is_dir() and note.get("schema") != _schema(layout.home / backup.RECORDS):
         raise Refused(
             f"{copy} is gone, and {old.name} cannot read the records as they are: put this backup back to its place"
         )
@@ -71,7 +72,8 @@ def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> N
     services.reload()
     services.enable()
     if services.start():
-        wait_until_well(layout, old, str(read_note(old / STAMP)["version"]), was_ready=False, limit_s=limit_s)
+        version = str(read_note(old / STAMP)["version"])
+        wait_until_well(layout, old, version, was_ready=False, needs_records=False, limit_s=limit_s)
     layout.upgrade.unlink()
     layout.previous.unlink()
     print_progress(f"{old.name} is in use again")
@@ -80,7 +82,15 @@ def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> N
 def _restores(layout: Layout, copy: Path) -> bool:
     """Return whether the old release needs the records of its backup: those in use have another schema."""
     records, old = layout.home / backup.RECORDS, copy / backup.RECORDS
-    return old.is_dir() and backup.schema_version(records) != backup.schema_version(old)
+    return old.is_dir() and _schema(records) != backup.schema_version(old)
+
+
+def _schema(records: Path) -> str | None:
+    """Return the schema of the records in use; None where nobody can read them as they are."""
+    try:
+        return backup.schema_version(records)
+    except sqlite3.Error:
+        return None
 
 
 def _reserve_bytes(layout: Layout) -> int:

@@ -39,6 +39,11 @@
     delete form.dataset.sent;
     form.removeAttribute("aria-busy");
     if (isReached) {
+      if (!form.isConnected) {
+        // Its part was renewed meanwhile: what was pressed is what is sent.
+        form.hidden = true;
+        document.body.append(form);
+      }
       reached.add(form);
       form.requestSubmit(submitter);
     }

@@ -83,6 +83,7 @@ def _comes_back(widths_um: Sequence[int]) -> bool:
     widths = np.array(widths_um)
     for place, width in enumerate(widths):
         narrower = np.flatnonzero(widths[:place] < width - _OPENED_UM)
-        if narrower.size and (np.abs(widths[: narrower[-1]] - width) <= _OPENED_UM).any():
+        # By less, not as much: a press may have steps of 0.1 mm.
+        if narrower.size and (np.abs(widths[: narrower[-1]] - width) < _OPENED_UM).any():
             return True
     return False

@@ -102,10 +102,10 @@ class CalibrationProcedure:
         """
         try:
             measured = await self._measure()
+            await self._rig.release()
         except BaseException:
             await self._press.let_go()
             raise
-        await self._rig.release()
         self._say(messages.STEP_JUDGE, 1, 1)
         return await asyncio.to_thread(self._judge, measured)
 

@@ -1,6 +1,7 @@
 """Ball press: presses the ball step by step and measures it, for calibration and verification."""
 
 import asyncio
+import contextlib
 import logging
 from dataclasses import dataclass
 
@@ -70,9 +71,13 @@ class BallPress:
         self.reference: Image | None = None
 
     async def let_go(self) -> None:
-        """Open the jaws after a failure, whose cause matters more than their own."""
+        """Open the jaws after a failure, whose cause matters more than their own; to the end, also when called off."""
+        releasing = asyncio.create_task(self._rig.release(), name="letting go of the ball")
+        while not releasing.done():
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.wait({releasing})
         try:
-            await self._rig.release()
+            releasing.result()
         except StationError as error:
             log.warning("the jaws could not be opened: %s", error)
 

@@ -66,10 +66,10 @@ class VerificationProcedure:
         """
         try:
             verified = await self._run()
+            await self._rig.release()
         except BaseException:
             await self._press.let_go()
             raise
-        await self._rig.release()
         return verified
 
     async def _run(self) -> VerificationResult:

@@ -78,9 +78,11 @@ def _narrower_than_before(widths_mm: Sequence[float]) -> list[int]:
 def _longest_run(values: npt.NDArray[np.float64], floors: npt.NDArray[np.float64]) -> list[int]:
     """Places of the longest run in which no value falls below the floor of one before it, the last one first.
 
-    Dynamic programming over the run's last place and its length, in quadratic time: of all runs of one length the one
-    with the lowest highest floor is continued by whatever continues another.
+    Dynamic programming over the run's last place and its length, in quadratic time and memory where any value falls: of
+    all runs of one length the one with the lowest highest floor is continued by whatever continues another.
     """
+    if (values[1:] >= np.maximum.accumulate(floors)[:-1]).all():
+        return list(range(values.size))[::-1]
     lowest = np.full(values.size + 1, np.inf)  # the lowest highest floor of the runs so far, by their length
     lowest[0] = -np.inf
     ending = np.full((values.size, values.size + 1), np.inf)  # likewise of those that end at a place

@@ -22,7 +22,7 @@ from station.vocabulary import Flag
 _SATURATED_LEVEL = 250
 _OPEN_WITHIN_MM = 2.0
 """How far short of their width jaws still count as open, mm. Estimate: a few times the 2 counts of 0.4 mm within which
-the gripper counts as at its place, and less than the jaws are opened beside a fruit."""
+the gripper counts as at its place."""
 
 ALARMS = (AlarmId.CAMERA_SATURATED, AlarmId.CAMERA_DIRTY, AlarmId.CAMERA_LED_DEAD, AlarmId.REFERENCE_BAD)
 """Alarms that a refused reference raises."""

@@ -148,7 +148,7 @@ class Station:
         await self._serve(stack, panel, pages)
         port = await health.start()
         stack.push_async_callback(health.close)
-        await self._open_devices(stack, devices, pages)
+        await self._open_devices(stack, devices, pages, alarms)
         tasks += [self._begin(stack, service.runner.run(), CYCLE), self._begin(stack, upkeep.run(), UPKEEP)]
         self._begin(stack, alarms.store_changes(records), "alarms' records")
         self._begin(stack, audit.run(), "audit trail")
@@ -156,8 +156,11 @@ class Station:
         return tuple(tasks), port
 
     @staticmethod
-    async def _open_devices(stack: contextlib.AsyncExitStack, devices: DeviceManager, pages: PanelPages) -> None:
+    async def _open_devices(
+        stack: contextlib.AsyncExitStack, devices: DeviceManager, pages: PanelPages, alarms: AlarmManager
+    ) -> None:
         """Open the devices; manual motions from the panel end before the devices are closed."""
+        alarms.clear_absent(devices.monitors)
         stack.push_async_callback(devices.close)
         await stack.enter_async_context(pages)
         await devices.open()

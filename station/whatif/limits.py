@@ -241,9 +241,12 @@ def _with_open_limit(recipe: Recipe, closing_mm: float) -> Recipe:
     open_limit = {"closing_mm": closing_mm, "area_mm2": LARGEST_AREA_MM2}
     earlier = [each for each in recipe.damage.area if each.closing_mm < closing_mm]
     area = (*earlier, recipe.damage.area[-1].model_copy(update=open_limit))
+    damage: dict[str, object] = {"area": area}
+    if recipe.damage.decided_by == "every_limit":  # what one limit keeps from passing, all of them together do not pass
+        damage["decided_by"] = "every_trusted"
     return recipe.model_copy(
         update={
-            "damage": recipe.damage.model_copy(update={"area": area}),
+            "damage": recipe.damage.model_copy(update=damage),
             "steps": recipe.steps.model_copy(update={"stop_when_decided": True}),
         }
     )

@@ -224,6 +224,14 @@ def test_a_width_that_is_read_several_times_is_no_opening_of_the_jaws(widths_mm,
     assert [len(run.numbers) for run in runs(sources, table, sequence=sequence)] == lengths
 
 
+def test_a_press_in_steps_of_a_tenth_of_a_millimetre_is_one_in_any_order_of_its_names():
+    names = "abcdefghijkl"
+    steps = (0, 9, 10, 11, 1, 2, 3, 4, 5, 6, 7, 8)
+    table: dict[str, float] = {name: 40 - 0.1 * step for name, step in zip(names, steps, strict=True)}
+    sources = [source(name) for name in names]
+    assert by_name(sources, runs(sources, table, sequence=False)) == ["aefghijklbcd"]
+
+
 def test_videos_folders_and_files_are_presses_of_their_own():
     sources = [
         source("a"), source("B", 1), source("C", 1), source("d"), source("?", refused=True), source("E", 3, video=True),

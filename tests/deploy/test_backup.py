@@ -315,17 +315,40 @@ def test_a_rollback_without_room_to_restore_the_records_is_refused_before_the_st
     rollback.check(installed)
 
 
+def test_records_that_nobody_can_read_are_restored_by_a_rollback(installed, installer):
+    rollback = installer("rollback")
+    installer("layout").point(installed.previous, installed.current.resolve())
+    copy = installed.backups / "before-upgrade-20260101T000000Z"
+    for folder in (installed.home, copy):
+        (folder / "records").mkdir(parents=True)
+        (folder / "records/records.sqlite3").touch()
+    with closing(sqlite3.connect(copy / "records/records.sqlite3")) as connection:
+        connection.executescript("CREATE TABLE alembic_version (version_num); INSERT INTO alembic_version VALUES (7)")
+    note = {"from": "0.1.0+test", "to": "0.2.0+test", "copy": copy.name, "schema": "7", "configuration": None}
+    installer("layout").write_note(installed.upgrade, note)
+    rollback.check(installed)
+    assert rollback._restores(installed, copy)
+
+
 @pytest.fixture
-def upgraded(installed, installer, monkeypatch):
-    """An installation whose upgrade changes "old" to "new" in the configuration, and whose programs are stand-ins."""
+def words():
+    """The words that an upgrade replaces in the configuration."""
+    return {"old": "new"}
+
+
+@pytest.fixture
+def upgraded(installed, installer, words, monkeypatch):
+    """An installation whose upgrade changes words in the configuration, and whose programs are stand-ins."""
     layouts, numbers = installer("layout"), itertools.count(1)
     installed.configuration.write_text("# old\n")
 
     def changes(layout, _release):
-        return ("old is new now",) if "old" in layout.configuration.read_text() else ()
+        text = layout.configuration.read_text().split()
+        return tuple(f"{old} is {new} now" for old, new in words.items() if old in text)
 
     def migrate(layout, _release):
-        layout.configuration.write_text(layout.configuration.read_text().replace("old", "new"))
+        text = layout.configuration.read_text().split()
+        layout.configuration.write_text(" ".join(words.get(word, word) for word in text) + "\n")
 
     def make_backup(layout, _release, kind):
         (copy := layout.backups / f"{kind}{next(numbers)}").mkdir()
@@ -351,8 +374,9 @@ def services():
     return SimpleNamespace(**dict.fromkeys(("stop", "reload", "enable", "make_user"), lambda: None), **started)
 
 
+@pytest.mark.parametrize("second_changes", [{}, {"new": "newer"}])
 def test_an_upgrade_after_one_to_another_release_was_interrupted_is_taken_back_to_the_configuration_of_before(
-    upgraded, installer, services
+    upgraded, installer, services, words, second_changes
 ):
     failed, old = installer("messages").Failed, upgraded.current.resolve()
 
@@ -363,6 +387,7 @@ def test_an_upgrade_after_one_to_another_release_was_interrupted_is_taken_back_t
     for step in upgrade("0.2.0").steps()[:5]:  # up to the configuration's migration; then somebody pulled the plug
         step.do()
     assert upgraded.configuration.read_text() == "# new\n"
+    words.update(second_changes)
     starts = iter([failed("it does not start")])
 
     def start():

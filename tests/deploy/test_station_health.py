@@ -37,7 +37,7 @@ def wait(installer, tmp_path, monkeypatch):
     """Wait for a station of version 0.2.0 with these dependencies, which accepts no trigger."""
     health, layout = installer("health"), installer("layout").Layout(tmp_path)
 
-    def run(dependencies, *, was_ready):
+    def run(dependencies, *, was_ready, **options):
         answers = {
             "/livez": (200, {"live": True}),
             "/version": (200, {"fruit-station": "0.2.0"}),
@@ -46,7 +46,7 @@ def wait(installer, tmp_path, monkeypatch):
         with answering(answers) as port:
             shown = json.dumps({"metrics": {"host": "127.0.0.1", "port": port}})
             monkeypatch.setattr(health, "station", lambda *_words: shown)
-            health.wait_until_well(layout, tmp_path, "0.2.0", was_ready=was_ready, limit_s=1.0)
+            health.wait_until_well(layout, tmp_path, "0.2.0", was_ready=was_ready, limit_s=1.0, **options)
 
     return run
 
@@ -61,6 +61,7 @@ def test_a_station_that_was_not_ready_need_not_be_but_has_to_use_its_records(wai
     failed = installer("messages").Failed
     with pytest.raises(failed, match="it cannot use its records: no room for a copy; free space"):
         wait([ARM, NOT_OPEN], was_ready=False)
+    wait([ARM, NOT_OPEN], was_ready=False, needs_records=False)
 
 
 def test_a_station_that_was_ready_has_to_be_again(wait, installer):

@@ -9,6 +9,7 @@ import pytest
 from hmi.web.roles import Role
 from station.channel.panel_live import OperatorCommandView, PanelState
 from station.messages import lots
+from station.messages.operation import INTERNAL_FAULT
 from station.runtime.production.lots import LotManager
 from station.runtime.production.operator_commands import OperatorCommands
 from tests.hmi.test_security import log_in
@@ -60,3 +61,13 @@ def test_a_page_that_shows_another_lot_ends_none(pages, station):
     page = pages("GET", "/lot")[2].decode()
     assert end().state == "done"
     assert station._lots.named == ""
+
+
+def test_a_command_that_ends_by_a_bug_has_failed_and_says_so(pages, station, monkeypatch):
+    async def fails(*_lot):
+        raise RuntimeError("a bug")
+
+    monkeypatch.setattr(station, "_start_lot", fails)
+    assert pages.post("/order", csrf=pages.token(), order="start_lot", argument="A-17")[0] == 303
+    [entry] = station.recent
+    assert (entry.state, entry.why) == ("failed", INTERNAL_FAULT(words="RuntimeError: a bug"))

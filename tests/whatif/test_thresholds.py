@@ -216,14 +216,15 @@ class TestWhatAPressSays:
         assert math.isinf(good.passes_from_mm2)
 
     @pytest.mark.parametrize("stops", [True, False])
-    def test_a_bad_fruit_that_an_earlier_limit_lets_pass_no_more_is_passed_by_no_later_limit(self, changed, stops):
+    @pytest.mark.parametrize("by", ["every_trusted", "every_limit"])
+    def test_a_bad_fruit_that_an_earlier_limit_lets_pass_no_more_is_passed_by_no_later_limit(self, changed, stops, by):
         """It grows by 47 mm² per mm, and is stopped at 1.9 mm, too near the limit there to pass."""
         press = self.press((8.0, 47 * 1.12, 47 * 1.87))
         verdict = judge(press, self.RECIPE)
         assert (verdict.outcome, verdict.reasons) == ("NO_RESULT", (Reason.NEAR_LIMIT,))
         assert verdict.stopped is not None
         assert verdict.stopped.finding is None
-        draft = changed(self.RECIPE, steps__stop_when_decided=stops)
+        draft = changed(self.RECIPE, steps__stop_when_decided=stops, damage__decided_by=by)
         bad = marked_fruit(press, self.RECIPE, 3.0, good=False, draft=draft)
         assert bad is not None
         assert (bad.passes_from_mm2, bad.at_least) == (math.inf, False)

@@ -101,6 +101,8 @@ class AlarmManager:
         self._to_restore = to_restore
         self._device_alarms: dict[str, AlarmId | None] = {}
         """Last alarm of each device's monitor; a reference may raise the same one of a camera."""
+        self._watched: tuple[str, ...] = ()
+        """The station's devices."""
         self._unsaved: list[AlarmEntry] = []
         self._changed = asyncio.Event()
 
@@ -140,6 +142,7 @@ class AlarmManager:
 
     def clear_absent(self, devices: Collection[str]) -> None:
         """Clear the alarms that none of a station's devices raises: of an arm that was configured away."""
+        self._watched = tuple(devices)
         watched = {alarm for device in devices for alarm in OF_DEVICE[device]}
         for alarms in OF_DEVICE.values():
             for alarm in alarms - watched:
@@ -149,8 +152,9 @@ class AlarmManager:
         """Raise the alarm of the fault of the `arm`, `gripper` or `camera`, or clear the alarms of a healthy one."""
         told = None if fault is None else alarm_of(device, fault)
         before, self._device_alarms[device] = self._device_alarms.get(device), told
+        unheard = {alarm for name in self._watched if name not in self._device_alarms for alarm in OF_DEVICE[name]}
         for alarm in OF_DEVICE[device] | ({before} if before is not None else set()):
-            if alarm not in self._device_alarms.values():
+            if alarm not in self._device_alarms.values() and alarm not in unheard:
                 self.clear(alarm)
         if told is not None and fault is not None:
             self.update(told, message_of(fault))

@@ -104,6 +104,12 @@ class CycleRunner:
         self._events: asyncio.Queue[Happened] = asyncio.Queue()
         self._doing: dict[asyncio.Task[None], Action] = {}
         self._changed = asyncio.Event()
+        self._coming: State | None = None
+
+    @property
+    def bound_for(self) -> State:
+        """The state, or the next one while what it needs is made durable: HALT comes before it."""
+        return self._coming or self.state
 
     @property
     def state(self) -> State:
@@ -176,11 +182,15 @@ class CycleRunner:
         storing = None if transition is None else self._performer.storing(event, transition.state)
         if transition is None or storing is None:
             return False
-        if Action.HALT not in transition.actions:
-            await storing
-            return False
-        await asyncio.gather(storing, self._halt())  # no motion waits for the disk
-        return True
+        self._coming = transition.state
+        try:
+            if Action.HALT not in transition.actions:
+                await storing
+                return False
+            await asyncio.gather(storing, self._halt())  # no motion waits for the disk
+            return True
+        finally:
+            self._coming = None
 
     async def _act(self, actions: tuple[Act, ...], because: Happened, *, halted: bool = False) -> None:
         for act in actions:

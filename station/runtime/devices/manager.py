@@ -269,10 +269,11 @@ class DeviceManager:
             self._not_activated = None
 
     async def end_recovery(self) -> None:
-        """Stop the restoring of a lost activation, and wait for its end; nothing is done where there is none.
+        """Stop the restoring of a lost activation, and wait for its end; a later one needs the jaws confirmed anew.
 
         Fingers that travel already come to their end, which nothing but their power prevents.
         """
+        self._confirmed_clear = False
         if self._recovery.locked():
             await self.halt()
             async with self._recovery:

@@ -22,6 +22,9 @@ from station.settings.recipe import Recipe
 FRAME_DEADLINE_S = 1.0
 _MOST_FAULTY_FRAMES = 10
 _HEALTH_LEASE_S = 2.0
+_FREE_WITHIN_MM = 1.0
+"""How far short of a width beside a fruit jaws still let it go, mm: above the 2 counts of 0.4 mm within which the
+gripper counts as at its place, and below `FREED_BY_MM` of `station.inspection.second_press`."""
 
 
 class FramesError(GripError):
@@ -171,8 +174,11 @@ async def open_freely(gripper: Gripper, width_mm: float | None = None) -> MoveRe
         GripperError: as `Gripper.open`.
     """
     move = await gripper.open(width_mm)
-    stopped = move.reading.object_state is ObjectState.CONTACT_OPENING
-    if stopped and not are_open(move.width_mm, move.requested_width_mm):
+    if width_mm is None:
+        is_free = are_open(move.width_mm, move.requested_width_mm)
+    else:
+        is_free = move.width_mm >= move.requested_width_mm - _FREE_WITHIN_MM
+    if move.reading.object_state is ObjectState.CONTACT_OPENING and not is_free:
         not_open = messages.JAWS_NOT_OPEN(width_mm=move.width_mm, open_mm=move.requested_width_mm)
         raise GripperTimeoutError(not_open, REMEDY_LATE())
     return move

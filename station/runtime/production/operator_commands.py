@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import itertools
+import logging
 from collections import deque
 
 from station.channel.line import Command, CommandName
@@ -16,6 +17,7 @@ from station.inspection.states import State
 from station.messages import commands as messages
 from station.messages import lots
 from station.messages.message import Message, message_of
+from station.messages.operation import INTERNAL_FAULT
 from station.records.errors import RecordsError
 from station.records.lots import end_lot, start_lot
 from station.records.records import Records
@@ -46,6 +48,8 @@ _COMMANDS = {
     OperatorCommandName.SET_MODE: CommandName.SET_MODE,
 }
 """Commands that the PLC has too are executed as the PLC's."""
+
+log = logging.getLogger(__name__)
 
 
 class OperatorCommands:
@@ -133,6 +137,9 @@ class OperatorCommands:
             why = await self._execute(request)
         except StationError as error:
             why = message_of(error)
+        except Exception as error:  # the pages must not show for ever that it is in progress
+            log.exception("order %s", request.order)
+            why = INTERNAL_FAULT(words=f"{type(error).__name__}: {error}")
         ended = entry.model_copy(
             update={"state": "done" if why is None else "failed", "why": why, "ended_utc_ms": utc_ms()}
         )

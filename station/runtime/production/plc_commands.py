@@ -8,6 +8,7 @@ from typing import Any
 
 from station.channel.line import Command, CommandDone, CommandName, Line, RegisterView
 from station.channel.panel import Recover
+from station.channel.server import is_expired
 from station.devices.arm.faults import ArmFault
 from station.errors import BadInputError
 from station.inspection.alarm_table import AlarmId
@@ -145,6 +146,9 @@ class PlcCommands:
             # With its wait for the command before: the PLC reads timed_out soon after, and nothing may begin then.
             async with asyncio.timeout(DEADLINE_S):
                 async with contextlib.nullcontext() if command.command in _AT_ONCE else self._turn:
+                    # The PLC's own limit may be shorter; a command of the panel outlives the request that ordered it.
+                    if by[1] == PLC and is_expired():
+                        raise TimeoutError  # noqa: TRY301 (it ends as one that is too slow itself)
                     why = await self._execute(command, by)
         except TimeoutError:
             why = messages.TOO_SLOW(command=command.command, limit_s=DEADLINE_S, activity=self._activity())

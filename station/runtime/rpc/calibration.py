@@ -180,12 +180,12 @@ class PanelCalibration:
 
     def _motion_refusal(self) -> Message | None:
         """Return why a run may move nothing now but jaws that open."""
-        state = self._service.state
+        state = self._service.runner.bound_for
         return None if state in _MOVES_IN else STATES[state].activity
 
     def _opening_refusal(self) -> Message | None:
         """Return why not even the jaws may open now."""
-        state = self._service.state
+        state = self._service.runner.bound_for
         return STATES[state].activity if state in STOPPED_FOR_A_PERSON else None
 
     async def _run_procedure(self, run: _Run, request: StartCalibrationRun) -> None:

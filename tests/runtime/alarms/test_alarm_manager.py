@@ -81,3 +81,17 @@ def test_the_alarms_of_an_arm_that_was_configured_away_end_and_those_that_a_grip
     }
     manager.clear_absent({CAMERA, GRIPPER})
     assert {alarm.id for alarm in manager.alarms.active} == {AlarmId.EMERGENCY_STOP, AlarmId.GRIPPER_FAULT}
+
+
+def test_an_alarm_that_two_devices_raise_stays_as_it_was_until_both_were_heard():
+    async def load_alarms():
+        return (StoredAlarm(AlarmId.EMERGENCY_STOP, "acknowledged", 1, 1),)
+
+    records: Any = SimpleNamespace(load_alarms=load_alarms, notices=())
+    manager = AlarmManager(Metrics("0", 1.0), to_restore=True)
+    manager.clear_absent((ARM, CAMERA, GRIPPER))
+    asyncio.run(manager.restore(records))
+    manager.set_device_fault(GRIPPER, None)
+    assert manager.alarms.get(AlarmId.EMERGENCY_STOP).state == "acknowledged"
+    manager.set_device_fault(ARM, None)
+    assert manager.alarms.get(AlarmId.EMERGENCY_STOP).state != "acknowledged"

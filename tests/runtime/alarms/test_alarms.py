@@ -270,7 +270,7 @@ def stored(monkeypatch, alarm):
 
 
 @pytest.mark.timeout(240)
-def test_an_alarm_of_a_device_that_is_still_faulty_outlives_a_restart_as_it_was(bench, until, updates, monkeypatch):
+def test_an_alarm_of_a_device_that_is_still_faulty_outlives_a_restart_as_it_was(bench, updates, monkeypatch):
     """On a bench the gripper waits for a person's reset, which activates it."""
     stored(monkeypatch, AlarmId.GRIPPER_FAULT)
 
@@ -289,7 +289,7 @@ def test_an_alarm_of_a_device_that_is_still_faulty_outlives_a_restart_as_it_was(
 
 
 @pytest.mark.timeout(240)
-def test_an_alarm_of_an_arm_that_was_configured_away_is_over_after_the_start(bench, until, monkeypatch):
+def test_an_alarm_of_an_arm_that_was_configured_away_is_over_after_the_start(bench, monkeypatch):
     stored(monkeypatch, AlarmId.ARM_LINK_LOST)
 
     async def scenario():

@@ -12,6 +12,7 @@ from station.devices.camera.interface import Frame
 from station.devices.gripper.errors import GripperTimeoutError
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
 from station.inspection.cycle import PLACING, TABLE, Event
+from station.inspection.second_press import FREED_BY_MM
 from station.inspection.states import State
 from station.press.motion import Met
 from station.press.rig import GripError, Position
@@ -140,6 +141,18 @@ def test_jaws_that_something_stops_while_they_open_have_not_let_the_fruit_go(
     with pytest.raises(GripError if release == "rig" else GripperTimeoutError):
         asyncio.run(releases[release]())
     assert len(jaws.opened_to_mm) == (2 if release == "let go" else 1), "to let go is tried again"
+
+
+@pytest.mark.parametrize("opened_by_mm", [0.0, FREED_BY_MM - 0.5])
+def test_jaws_that_are_stopped_where_they_met_the_fruit_have_not_freed_it(opened_by_mm):
+    met_mm = OPEN_MM - 5.0
+    jaws, now = Jaws(met_mm + opened_by_mm, moves=False, state=ObjectState.CONTACT_OPENING), inspection()
+    now.met_mm = met_mm
+    if opened_by_mm:
+        asyncio.run(inspector(jaws).free_fruit(now))
+        return
+    with pytest.raises(GripperTimeoutError):
+        asyncio.run(inspector(jaws).free_fruit(now))
 
 
 def test_a_judged_fruit_that_was_not_surely_released_needs_a_person():

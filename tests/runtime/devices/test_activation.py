@@ -125,6 +125,17 @@ def test_a_confirmation_of_empty_jaws_ends_with_a_gripper_that_can_close_on_a_fr
     asyncio.run(scenario())
 
 
+def test_a_confirmation_of_empty_jaws_ends_with_what_withdraws_the_reset(bench):
+    async def scenario():
+        bench.gripper.active = False
+        bench.devices.confirm_clear()
+        await bench.devices.end_recovery()
+        assert str(await bench.activate()) == str(EMPTY_THE_JAWS)
+        assert bench.gripper.activations == 0
+
+    asyncio.run(scenario())
+
+
 @pytest.mark.parametrize(("active", "fault_code"), [(False, 0), (True, 0xC), (False, 0xC)])
 def test_a_confirmation_remains_while_the_gripper_waits_for_its_activation(bench, active, fault_code):
     async def scenario():

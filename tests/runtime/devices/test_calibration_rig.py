@@ -49,11 +49,24 @@ class Devices:
         self.moves.append(pose)
 
 
+class Service:
+    """A cycle whose state is set by hand."""
+
+    manual_activity = None
+
+    def __init__(self) -> None:
+        self.state, self.runner = State.IDLE, self
+
+    @property
+    def bound_for(self) -> State:
+        return self.state
+
+
 class Panel:
     """A panel's calibration over a cycle whose state is set by hand."""
 
     def __init__(self, home: Any) -> None:
-        self.devices, self.service = Devices(), SimpleNamespace(state=State.IDLE, manual_activity=None)
+        self.devices, self.service = Devices(), Service()
         camera: Any = SimpleNamespace(description=SimpleNamespace(serial="D1"))
         gripper_and_arm: Any = self.devices
         cell = Cell(camera, gripper_and_arm, gripper_and_arm)

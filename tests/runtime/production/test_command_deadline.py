@@ -47,6 +47,10 @@ def test_a_command_that_waited_to_its_deadline_is_not_begun_afterwards(monkeypat
         monkeypatch.setattr(plc_commands, "DEADLINE_S", 25.0)
         assert (await commands.execute(RESET)).done
         assert len(begun) == 1
+        monkeypatch.setattr(plc_commands, "is_expired", lambda: True)
+        assert not (await commands.execute(RESET)).done, "the PLC waits no longer than its own setting"
+        assert (await commands.execute(RESET, ("anna", "operator"))).done
+        assert len(begun) == 2
 
     asyncio.run(main())
 
