@@ -326,7 +326,11 @@ class Panel:
 
     def until(self, selector: str, words: str) -> None:
         """Wait until a part of the page says something."""
-        self.page.locator(selector).filter(has_text=re.compile(words)).first.wait_for(timeout=1000 * PATIENCE_S)
+        part = self.page.locator(selector)
+        try:
+            part.filter(has_text=re.compile(words)).first.wait_for(timeout=1000 * PATIENCE_S)
+        except BrowserTimeout as late:
+            raise AssertionError(f"{self.page.url} does not say {words!r} but {part.all_inner_texts()}") from late
 
 
 @pytest.fixture
