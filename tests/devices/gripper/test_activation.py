@@ -7,37 +7,20 @@ import pytest
 from station.devices.gripper.errors import GripperStoppedError
 from station.devices.gripper.link import State, Status
 from station.devices.gripper.robotiq import Robotiq2F85
-from station.messages import gripper as messages
 from station.settings.gripper import GripperSettings
+from tests.devices.gripper.scripted_link import ScriptedLink
 
 
-class ResetLink:
+class ResetLink(ScriptedLink):
     """A gripper without its activation, which never becomes active."""
 
-    place = messages.PLACE_URCAP(address="a script")
-
     def __init__(self) -> None:
-        self.sent: list[str] = []
+        super().__init__(Status(state=State.RESET, go_to=False, object_=0, fault=0, echo=0, position=3, current_a=None))
         self.was_reset = asyncio.Event()
 
-    async def status(self) -> Status:
-        return Status(state=State.RESET, go_to=False, object_=0, fault=0, echo=0, position=3, current_a=None)
-
     async def reset(self) -> None:
-        self.sent.append("reset")
+        await super().reset()
         self.was_reset.set()
-
-    async def begin_activation(self) -> None:
-        self.sent.append("begin_activation")
-
-    async def go_to(self, position: int, speed: int, force: int) -> None:
-        self.sent.append(f"go_to {position}")
-
-    async def halt(self) -> None:
-        self.sent.append("halt")
-
-    async def close(self) -> None:
-        self.sent.append("close")
 
 
 def test_a_stop_between_the_reset_and_the_activation_leaves_the_fingers_where_they_are():

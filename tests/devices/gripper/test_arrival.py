@@ -13,40 +13,13 @@ from station.devices.gripper.link import State, Status
 from station.devices.gripper.robotiq import Robotiq2F85
 from station.messages import gripper as messages
 from station.settings.gripper import GripperSettings
+from tests.devices.gripper.scripted_link import ScriptedLink
 
 START = Status(state=State.ACTIVE, go_to=True, object_=3, fault=0, echo=50, position=50, current_a=None)
 TARGET = 53
 """A millimetre further than 50: the count nearest to a width of 34.3 mm."""
 WIDTH_MM = 34.3
 MARGIN_S = 0.1
-
-
-class ScriptedLink:
-    """Gives one status after another, the last one for ever."""
-
-    place = messages.PLACE_URCAP(address="a script")
-
-    def __init__(self, *statuses: Status) -> None:
-        self._statuses = [START, *statuses]
-        self.sent: list[str] = []
-
-    async def status(self) -> Status:
-        return self._statuses.pop(0) if len(self._statuses) > 1 else self._statuses[0]
-
-    async def reset(self) -> None:
-        self.sent.append("reset")
-
-    async def begin_activation(self) -> None:
-        self.sent.append("begin_activation")
-
-    async def go_to(self, position: int, speed: int, force: int) -> None:
-        self.sent.append(f"go_to {position}")
-
-    async def halt(self) -> None:
-        self.sent.append("halt")
-
-    async def close(self) -> None:
-        self.sent.append("close")
 
 
 def moved(link: ScriptedLink) -> int:
@@ -57,7 +30,7 @@ def moved(link: ScriptedLink) -> int:
 def test_an_object_state_from_before_the_move_is_not_taken_for_arrival():
     stale = replace(START, echo=TARGET, position=51)
     moving, there = replace(stale, object_=0, position=52), replace(stale, position=TARGET)
-    link = ScriptedLink(replace(START, echo=TARGET), stale, moving, there)
+    link = ScriptedLink(START, replace(START, echo=TARGET), stale, moving, there)
     assert moved(link) == TARGET
     assert link.sent == [f"go_to {TARGET}"]
 
@@ -73,14 +46,14 @@ def test_fingers_at_the_place_itself_have_arrived_and_others_rest_for_two_readin
             return status
 
     at_rest = replace(START, echo=TARGET, position=reached)
-    link = CountingLink(replace(at_rest, object_=0, position=51), at_rest)
+    link = CountingLink(START, replace(at_rest, object_=0, position=51), at_rest)
     assert moved(link) == reached
     assert link.at_rest == readings
 
 
 def test_contact_ends_the_move_once_the_fingers_stand():
     touching = replace(START, echo=TARGET, object_=2, position=51)
-    assert moved(ScriptedLink(touching, replace(touching, position=52))) == 52
+    assert moved(ScriptedLink(START, touching, replace(touching, position=52))) == 52
 
 
 def test_fingers_that_arrived_are_not_late_because_their_answers_are_read_late():
@@ -89,7 +62,7 @@ def test_fingers_that_arrived_are_not_late_because_their_answers_are_read_late()
             await asyncio.sleep(1.5 * MARGIN_S)
             return await super().status()
 
-    link = SlowLink(replace(START, echo=TARGET, position=TARGET))
+    link = SlowLink(START, replace(START, echo=TARGET, position=TARGET))
     assert moved(link) == TARGET
     assert link.sent == [f"go_to {TARGET}"]
 
@@ -114,7 +87,7 @@ def test_a_moving_gripper_is_asked_as_often_as_it_refreshes_however_long_an_answ
     monkeypatch.setattr(robotiq, "time", SimpleNamespace(monotonic=lambda: now_s))
     monkeypatch.setattr(robotiq.asyncio, "sleep", sleep)
     moving = replace(START, echo=TARGET, object_=0, position=51)
-    assert moved(TimedLink(moving, moving, replace(START, echo=TARGET, position=TARGET))) == TARGET
+    assert moved(TimedLink(START, moving, moving, replace(START, echo=TARGET, position=TARGET))) == TARGET
     assert [after - before for before, after in pairwise(asked_s[1:])] == pytest.approx([every_s] * 2)
 
 
@@ -128,7 +101,7 @@ def test_a_moving_gripper_is_asked_as_often_as_it_refreshes_however_long_an_answ
     ids=["still moving", "another master's request", "somewhere else"],
 )
 def test_what_is_no_arrival_ends_in_a_time_out_and_a_halt(never: Status):
-    link = ScriptedLink(never)
+    link = ScriptedLink(START, never)
     with pytest.raises(GripperTimeoutError) as caught:
         moved(link)
     assert caught.value.cause.parameters["step"] == messages.STEP_MOVE(count=TARGET)
