@@ -81,7 +81,7 @@ def repeats() -> str:
 
 def measured(references: Sequence[Image], steps: Sequence[Step], segmentation: Segmentation) -> list[int]:
     """The areas of a press, px."""
-    method = make_method([median_image(references)], segmentation)
+    method = make_method(median_image(references), segmentation)
     return [method.measure(image).area_px for _, image in steps]
 
 

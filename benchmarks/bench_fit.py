@@ -238,7 +238,7 @@ def main() -> None:
         if wanted.fit or wanted.all or not any(others):
             fit(runner, wanted.cache)
         if wanted.reliability or wanted.all:
-            lines = reliability(runner.parts[1], wanted.images, wanted.processes)
+            lines = reliability(wanted.images, wanted.processes)
             document.write_section("Reliability", lines)
             report(f"curve in {PICTURE}")
         if wanted.reference or wanted.all:

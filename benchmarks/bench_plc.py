@@ -86,7 +86,7 @@ def work_on_images() -> None:
 
     cv2.setNumThreads(max(1, (os.cpu_count() or 2) - 1))
     press = render_press("raspberry", 1, [3.0])
-    method = RobustMethod([press.references[0]], RobustParameters())
+    method = RobustMethod(press.references[0], RobustParameters())
     while True:
         method.measure(press.frames[0])
 

@@ -26,6 +26,7 @@ from threadpoolctl import threadpool_limits
 
 from station.settings.segmentation import PaperParameters, RobustParameters
 from station.twin.digit.press import render_press
+from station.vision.median import median_image
 from station.vision.paper import PaperMethod, amplified_difference, brightest_cluster, clean, denoise
 from station.vision.robust import RobustMethod
 
@@ -106,7 +107,7 @@ def robust_ms(file: Path) -> list[float]:
     """The robust method's milliseconds for each frame in a file of references and frames, in rounds."""
     presses = pickle.loads(file.read_bytes())
     steps = [
-        functools.partial(RobustMethod(references, RobustParameters()).measure, frame)
+        functools.partial(RobustMethod(median_image(references), RobustParameters()).measure, frame)
         for references, frames in presses
         for frame in frames
     ]
@@ -146,7 +147,7 @@ def whole_rows() -> list[tuple[str, float, str, float | None]]:
     paper: list[float] = []
     for kind in FRUITS:
         press = render_press(kind, 1, [0.0, *CLOSINGS_MM])
-        ours = RobustMethod(press.references, RobustParameters())
+        ours = RobustMethod(median_image(press.references), RobustParameters())
         theirs = PaperMethod(press.references[0], PaperParameters())
         for closing_mm, frame in zip((0.0, *CLOSINGS_MM), press.frames, strict=True):
             one, other = functools.partial(ours.measure, frame), functools.partial(theirs.measure, frame)

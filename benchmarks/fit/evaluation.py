@@ -14,6 +14,7 @@ from station.settings.segmentation import RobustParameters
 from station.twin.gel import MM_PER_PX
 from station.vision.constants import CONSTANTS, Constants
 from station.vision.contact import Contact
+from station.vision.median import median_image
 from station.vision.press import PressTracker
 from station.vision.robust import RobustMethod
 from station.vocabulary import Flag
@@ -124,7 +125,7 @@ def measure_press(
     if known and all(same):
         return known
     constants, read = _recorded(trial.constants)
-    method = RobustMethod(press.references, trial.parameters, constants, trial.without)
+    method = RobustMethod(median_image(press.references), trial.parameters, constants, trial.without)
     prepared = read()
     least = trial.parameters.least_confidence
     tracker = PressTracker(method) if followed else None

@@ -6,6 +6,7 @@ the areas are the same within rounding, and a whole data set is measured in seco
 
 import csv
 import hashlib
+import os
 import pickle
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -106,7 +107,9 @@ def cached(name: str, make: Callable[[], DataSet], folder: Path, version: str) -
     path = folder / f"{name}-{hashlib.sha256(version.encode()).hexdigest()[:12]}.pickle"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(pickle.dumps(make(), protocol=5))
+        beside = path.with_suffix(f".{os.getpid()}")  # another run may make the same
+        beside.write_bytes(pickle.dumps(make(), protocol=5))
+        beside.replace(path)
     data: DataSet = pickle.loads(path.read_bytes())
     return data
 

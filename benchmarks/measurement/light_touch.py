@@ -84,7 +84,7 @@ def light_contacts(frames_per_step: int, references: int) -> tuple[list[Light], 
             options = PressOptions(pose=Pose(x_px=x_px, y_px=y_px), unit=unit, references=references)
             closings = [0.0, *light_closings(kind, seed, options)]
             press = squeezed(kind, seed, closings, options, frames_per_step=frames_per_step)
-            method = RobustMethod(press.references, RobustParameters())
+            method = RobustMethod(median_image(press.references), RobustParameters())
             peer = contact_area_idea(median_image(press.references))
             for area_mm2, closing_mm, step in zip((0, *LIGHT_AREAS_MM2), closings, press.steps, strict=True):
                 image = mean_image(step.frames)
@@ -106,7 +106,7 @@ def gate_table(contacts: list[Light], presses: list[Beside]) -> list[str]:
     empty = [one.response for unit in UNITS for one in untouched(unit, "plain")]
     beside: list[float] = []
     for reference, image, far in presses:
-        response, _ = RobustMethod([reference], RobustParameters()).weak_response(image)
+        response, _ = RobustMethod(reference, RobustParameters()).weak_response(image)
         size = (response.shape[1], response.shape[0])
         clear = cv2.resize(far.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
         beside.append(float(response[clear].max()))

@@ -40,7 +40,7 @@ def contact_area_idea(reference: Image) -> Measure:
 def methods(reference: Image) -> dict[str, Measure]:
     """The methods compared, each prepared for a reference."""
     paper = PaperMethod(reference, PaperParameters())
-    robust = RobustMethod([reference], RobustParameters())
+    robust = RobustMethod(reference, RobustParameters())
     return {
         "`paper`, as printed": lambda image: paper.measure(image).mask,
         PEER: contact_area_idea(reference),

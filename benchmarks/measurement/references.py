@@ -9,6 +9,7 @@ import numpy as np
 from measurement import soft_bodies
 from station.settings.segmentation import RobustParameters
 from station.vision.contact import Contact, Image
+from station.vision.median import median_image
 from station.vision.robust import RobustMethod
 from station.vision.step import measure_step
 from station.vocabulary import Flag
@@ -22,7 +23,7 @@ def reference_table(folder: Path) -> list[str]:
     rows: list[tuple[str, list[Contact]]] = []
     paths = sorted((folder / "digit_backgrounds").glob("*.jpg"))
     units = [np.asarray(cv2.imread(str(path)), np.uint8) for path in paths]
-    methods = [RobustMethod([unit], RobustParameters()) for unit in units]
+    methods = [RobustMethod(unit, RobustParameters()) for unit in units]
     pairs = [methods[a].measure(units[b]) for a in range(len(units)) for b in range(len(units)) if a != b]
     rows.append(("real, another unit's reference, untouched", pairs))
     own = [method.measure(unit) for method, unit in zip(methods, units, strict=True)]
@@ -33,7 +34,7 @@ def reference_table(folder: Path) -> list[str]:
     for seed in TWIN_SEEDS[:17]:
         for press in soft_bodies.soft_presses([seed], frames_per_step=1, steps=4):
             mixed = soft_bodies.press_with_other_reference(press)
-            method = RobustMethod(mixed.references, RobustParameters())
+            method = RobustMethod(median_image(mixed.references), RobustParameters())
             pressed.append(method.measure(mixed.steps[-1].frames[0]))
     rows.append(("twin, another unit's reference, pressed", pressed))
     rows.append(("twin, specks moved since the reference, untouched", _measured(soft_bodies.moved_specks(TWIN_SEEDS))))
@@ -46,7 +47,9 @@ def reference_table(folder: Path) -> list[str]:
 
 
 def _measured(pairs: Iterable[soft_bodies.Untouched]) -> list[Contact]:
-    return [measure_step(RobustMethod(pair.references, RobustParameters()), pair.frames) for pair in pairs]
+    return [
+        measure_step(RobustMethod(median_image(pair.references), RobustParameters()), pair.frames) for pair in pairs
+    ]
 
 
 def compressed(images: Sequence[Image], how: str) -> list[Image]:

@@ -82,7 +82,7 @@ def measured_press(seed: int) -> list[Steps]:
     cv2.setNumThreads(1)
     found: list[Steps] = []
     for press in soft_bodies.soft_presses([seed]):
-        method = RobustMethod(press.references, RobustParameters())
+        method = RobustMethod(median_image(press.references), RobustParameters())
         tracker, peer = PressTracker(method), contact_area_idea(median_image(press.references))
         true_px = np.array([np.count_nonzero(filled(step.true_mask)) for step in press.steps], float)
         forces_n = np.array([step.force_n for step in press.steps])

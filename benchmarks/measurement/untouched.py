@@ -35,8 +35,9 @@ def untouched(unit: int, condition: str) -> list[Untouched]:
     """What is found on one unit at each of the times."""
     options, parameters = conditions()[condition], RobustParameters()
     sensor = DigitSensor(unit, unit, options.noise, options.drift)
-    references = [sensor.frame(None, k / FRAMES_PER_S, options.condition) for k in range(options.references)]
-    method, peer = RobustMethod(references, parameters), contact_area_idea(median_image(references))
+    frames = [sensor.frame(None, k / FRAMES_PER_S, options.condition) for k in range(options.references)]
+    reference = median_image(frames)
+    method, peer = RobustMethod(reference, parameters), contact_area_idea(reference)
     found: list[Untouched] = []
     for after_s in AFTER_S:
         times_s = [after_s + k / FRAMES_PER_S for k in range(FRAMES_PER_STEP)]

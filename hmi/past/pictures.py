@@ -67,7 +67,7 @@ def read_stages(folder: Path, sequence: int, step: int) -> Stages:
         pictures.append((name, _jpeg(picture)))
 
     segmentation = gated(recipe.segmentation, _gate_factor(record))
-    method = make_method([reference], segmentation)
+    method = make_method(reference, segmentation)
     # A step is measured with the contact of the step before, and that one with its own: all of them again.
     tracker, previous = PressTracker(method), None
     for before in range(step):

@@ -23,6 +23,7 @@ from station.errors import BadInputError
 from station.inspection.curve import Reading
 from station.settings.segmentation import Segmentation
 from station.vision.contact import Contact, Image
+from station.vision.median import median_image
 from station.vision.methods import make_method
 from station.vision.quality import DenoisingQuality, denoising_quality
 from station.vision.scale import TYPICAL_MM_PER_PX, TYPICAL_UNCERTAINTY, Scale
@@ -93,8 +94,8 @@ def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
             are kept.
     """
     _check_widths(request)
-    references = [decoded.image for decoded in request.references]
-    shape = references[0].shape
+    reference = median_image([decoded.image for decoded in request.references])
+    shape = reference.shape
     scale = _scale(request, shape[0], shape[1])
     order = _order(request)
     found: dict[int, _Summary | Refused] = {}
@@ -103,7 +104,7 @@ def analyze(request: Request, on_done: Callable[[], None]) -> Outcome:
             request.sources,
             order,
             shape,
-            lambda: make_method(references, request.segmentation),
+            lambda: make_method(reference, request.segmentation),
             jobs=request.jobs,
             stages=request.stages,
         ):

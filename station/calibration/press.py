@@ -85,7 +85,7 @@ class BallPress:
         """Take frames of the untouched gel, and measure against their median from now on."""
         untouched = await take_reference(self._rig, number)
         self.reference = await asyncio.to_thread(reference_image, untouched.frames)
-        method = await asyncio.to_thread(make_method, [self.reference], self._segmentation)
+        method = await asyncio.to_thread(make_method, self.reference, self._segmentation)
         self._measurement = PressMeasurement(method)
         return untouched
 

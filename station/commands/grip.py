@@ -26,6 +26,7 @@ from station.press.rig import MeasuredStep, Step
 from station.runtime.devices.rig import Cell, DeviceRig, renewed_lease
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.recipe import Recipe, find_recipe
+from station.vision.median import median_image
 from station.vision.methods import make_method
 
 _ARM_DEADLINE_S = 15.0
@@ -100,7 +101,7 @@ class _Observer:
     async def see_reference(self, untouched: Step) -> None:
         self._recording.add_references(untouched.images)
         segmentation = self._recipe.segmentation
-        method = await asyncio.to_thread(make_method, untouched.images, segmentation)
+        method = await asyncio.to_thread(make_method, median_image(untouched.images), segmentation)
         self._measurement = PressMeasurement(method)
 
     async def measure(self, step: Step) -> MeasuredStep:

@@ -16,6 +16,7 @@ from station.studies.failure import image_at
 from station.studies.sample import SampleResult, segmentation_of
 from station.studies.study import Study
 from station.twin.gel import MM_PER_PX
+from station.vision.median import median_image
 from station.vision.methods import make_method
 from station.vision.press import PressTracker
 
@@ -35,7 +36,7 @@ def press_sheet(study: Study, number: int) -> bytes:
     request = study.request
     press = member(request.kind, request.seed, number - 1).press()
     segmentation = segmentation_of(request.fruit, request.method)
-    method = StagedMethod(make_method(press.references, segmentation))
+    method = StagedMethod(make_method(median_image(press.references), segmentation))
     tracker = PressTracker(method)
     places = _spread(press.closings_mm)
     columns: list[dict[str, npt.NDArray[np.uint8]]] = []

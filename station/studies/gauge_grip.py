@@ -21,6 +21,7 @@ from station.twin.fruit import Fruit
 from station.twin.gel import MM_PER_PX, Gel
 from station.twin.squeeze import Squeeze
 from station.vision.contact import Contact
+from station.vision.median import median_image
 from station.vision.methods import make_method
 
 _FRAME_S, _STEP_S = 1 / 30, 0.5
@@ -134,7 +135,7 @@ class Grip:
     def __init__(self, recipe: Recipe, rig: FruitRig) -> None:
         self._recipe, self._rig = recipe, rig
         untouched = asyncio.run(take_reference(rig, recipe.imaging.reference_frames))
-        self.method = make_method(untouched.images, recipe.segmentation)
+        self.method = make_method(median_image(untouched.images), recipe.segmentation)
         self._measurement = PressMeasurement(self.method)
 
     def held(self, closing_mm: float) -> Contact:

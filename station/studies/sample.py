@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict
 from station.settings.recipe import find_recipe
 from station.settings.segmentation import Segmentation
 from station.studies.cohort import member
+from station.vision.median import median_image
 from station.vision.methods import make_method
 from station.vision.press import PressTracker
 
@@ -51,7 +52,7 @@ def measure_sample(task: Task) -> SampleResult:
     one = member(task.fruit, task.seed, task.number - 1)
     press = one.press()
     segmentation = segmentation_of(task.fruit, task.method)
-    tracker = PressTracker(make_method(press.references, segmentation))
+    tracker = PressTracker(make_method(median_image(press.references), segmentation))
     contacts = [tracker.measure_step([frame]) for frame in press.frames]
     return SampleResult(
         number=task.number,

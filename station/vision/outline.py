@@ -13,7 +13,6 @@ from station.vision.constants import Constants
 from station.vision.contact import FloatImage, Mask
 from station.vision.contour import Edge, find_edge, inside_image
 from station.vision.region import Region
-from station.vision.working import SUBPIXEL_BITS
 
 _MARGIN_PX = 6
 """At half the working size, around a textured body: as far as its segmentation's windows reach, and a pixel more."""
@@ -81,12 +80,25 @@ def find_outline(
 
 
 def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)) -> Mask:
-    """What an edge, px of half the working size, encloses: a mask, 0 or 255, of a shape, scaled along x and y."""
-    points = (edge.points + 0.5) * scale - 0.5
-    mask = np.zeros(shape, np.uint8)
-    fixed = np.rint(points * (1 << SUBPIXEL_BITS)).astype(np.int32)
-    cv2.fillPoly(mask, [fixed], 255, cv2.LINE_8, SUBPIXEL_BITS)
-    return mask
+    """What an edge, px of half the working size, encloses: a mask, 0 or 255, of a shape, scaled along x and y.
+
+    Pixels whose middle is enclosed. OpenCV's `fillPoly` adds those that the line touches: 1 % of a contact of 12 mm².
+    """
+    height, width = shape
+    (x, y), (next_x, next_y) = ends = np.array([(edge.points + 0.5) * scale - 0.5] * 2).transpose(0, 2, 1)
+    ends[1] = np.roll(ends[1], -1, axis=1)
+    # Down a column one is inside after each odd crossing of the edge.
+    first, last = (np.clip(np.ceil(of(x, next_x)), 0, width).astype(np.intp) for of in (np.minimum, np.maximum))
+    counts = last - first
+    side = np.repeat(np.arange(counts.size), counts)
+    column = np.arange(side.size) - np.repeat(np.cumsum(counts) - counts - first, counts)
+    down = y[side] + (column - x[side]) * ((next_y - y)[side] / (next_x - x)[side])
+    row = np.clip(np.ceil(down), 0, height).astype(np.intp)
+    crossed = np.zeros((height + 1, -(-width // 8) * 8), np.uint8)
+    np.bitwise_xor.at(crossed, (row, column), 255)
+    eight_at_once = crossed.view(np.uint64)[row.min(initial=height) : row.max(initial=0) + 1]
+    np.bitwise_xor.accumulate(eight_at_once, axis=0, out=eight_at_once)
+    return np.ascontiguousarray(crossed[:height, :width])
 
 
 def _fall(body: Region) -> npt.NDArray[np.float64]:

@@ -4,7 +4,7 @@
 adds its own part. `docs/robust.md` explains each with its reasons, and has the table of what each earns.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -20,7 +20,6 @@ from station.vision.constants import CONSTANTS, Constants
 from station.vision.contact import Contact, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.curvature import curvature, curvature_noise, first_background
 from station.vision.debris import Debris
-from station.vision.median import median_image
 from station.vision.outline import Outline, find_outline
 from station.vision.reference_check import ReferenceCheck
 from station.vision.region import (
@@ -134,7 +133,7 @@ class RobustMethod:
     """The robust measurement against one or several reference images.
 
     Args:
-        references: one or more images with nothing touching, each (height, width, 3), dtype uint8, BGR.
+        reference: the untouched gel, shape (height, width, 3), dtype uint8, BGR; of several frames their median.
         parameters: the recipe's.
         constants: all other numbers.
         without: stages of `STAGES` to leave out.
@@ -156,20 +155,18 @@ class RobustMethod:
 
     def __init__(
         self,
-        references: Sequence[Image],
+        reference: Image,
         parameters: RobustParameters,
         constants: Constants = CONSTANTS,
         without: frozenset[str] = frozenset(),
     ) -> None:
-        if not references:
-            raise ValueError("no reference image: at least one frame with nothing touching the gel is needed")
-        shape = references[0].shape
-        if any(r.shape != shape or r.dtype != np.uint8 or r.ndim != 3 or r.shape[2] != 3 for r in references):
-            raise ValueError(f"references must be uint8 images (height, width, 3) of one size, not {shape} and others")
+        shape = reference.shape
+        if reference.dtype != np.uint8 or reference.ndim != 3 or shape[2] != 3:
+            raise ValueError(f"reference {shape} {reference.dtype} must be a uint8 image (height, width, 3)")
         if unknown := without.difference(STAGES):
             raise ValueError(f"no such stage: {', '.join(sorted(unknown))}; there are {', '.join(STAGES)}")
         self._shape, self._parameters, self._constants, self._without = shape, parameters, constants, without
-        self._reference = working_image(median_image(references))
+        self._reference = working_image(reference)
         self._model = BackgroundModel(self._reference, constants)
         light = clipped(self._reference)
         height, width = light.shape[:2]
@@ -185,10 +182,7 @@ class RobustMethod:
         lit = np.asarray(means > constants.lit_share * means.max())  # a dead LED's colour adds nothing to what curves
         self._debris = Debris(light)
         self._clean = resized(self._debris.clean, self._quarter)
-        # The detector needs the mean of the references: a median's noise is not that of the frames.
-        halves = [resized(clipped(working_image(one)), self._half) for one in references]
-        mean = np.asarray(np.mean(halves, axis=0), np.float32)
-        self._weak = WeakContactDetector(mean, lit, self._debris.clean, constants, parameters.gate_ratio)
+        self._weak = WeakContactDetector(self._light, lit, self._debris.clean, constants, parameters.gate_ratio)
         unsaturated = np.asarray((self._reference < SATURATED_LEVEL).all(axis=2), np.float32)
         self._unsaturated = cv2.merge([resized(unsaturated, self._half)] * 3)
         least = float(np.mean(lit)) * parameters.least_bend
@@ -227,7 +221,7 @@ class RobustMethod:
         """See `Method.measure`; a firm contact is the same with `firm_only`.
 
         Raises:
-            ValueError: the image's shape or dtype is not the references'.
+            ValueError: the image's shape or dtype is not the reference's.
         """
         state = self._start(image, previous)
         state.agreed, state.firm_only = agreed, firm_only
@@ -327,7 +321,9 @@ class RobustMethod:
         if state.load_levels < self._constants.released_share * before.floor_load_levels:
             state.before = None
         else:
-            state.floor = before.floor
+            # An edge is found outside the floor: without room for it a body at rest would grow from step to step.
+            within = np.asarray(cv2.erode(before.floor, np.ones((3, 3), np.uint8)), np.uint8)
+            state.floor = within if within.any() else before.floor
 
     def _find_candidates(self, state: State) -> None:
         """Find where contacts may lie."""
@@ -404,14 +400,13 @@ class RobustMethod:
             state.mask = np.zeros((height, width), np.uint8)
             for outline in state.outlines:
                 state.mask |= outline.drawn(height, width)
-        if state.floor is not None and state.before is not None:
-            lost = Flag.LOWER_BOUND in state.flags and state.before.floor is not None
-            kept = state.before.floor if lost and state.before.floor is not None else state.floor
-            floor = cv2.resize(kept, (width, height), interpolation=cv2.INTER_NEAREST)
+        if state.floor is not None and state.before is not None and state.before.floor is not None:
+            floor = cv2.resize(state.before.floor, (width, height), interpolation=cv2.INTER_NEAREST)
             state.mask |= np.asarray(floor * 255, np.uint8)
         shape = state.changed.shape
-        contact = cv2.resize(state.mask, (shape[1], shape[0]), interpolation=cv2.INTER_NEAREST)
-        state.contact = np.asarray(contact > 0, np.uint8)
+        # Whole pixels only, so that what is handed on lies within the mask.
+        covered = cv2.resize(state.mask, (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
+        state.contact = np.asarray(covered == 255, np.uint8)
 
     def _keep_least(self, state: State) -> None:
         """Return at least what the step before did where no edge is trusted: compression only rises."""
@@ -511,7 +506,8 @@ class RobustMethod:
         changed_px = cv2.countNonZero(state.changed)
         agreed = agreement(contact_px, changed_px, self._constants)
         if state.before is not None and (before_px := cv2.countNonZero(state.before.contact)):
-            agreed *= agreement_of_growth((before_px, contact_px), (state.before.changed_px, changed_px))
+            kept_px = cv2.countNonZero(state.contact)
+            agreed *= agreement_of_growth((before_px, kept_px), (state.before.changed_px, changed_px))
         return agreed
 
     def _weak_response(self, state: State) -> WeakResponse:
@@ -526,10 +522,10 @@ class RobustMethod:
         before, background = state.before, state.background
         known = background.share >= self._constants.known_share / 2
         contact = state.contact
-        floor, load_levels = state.floor, 0.0 if before is None else before.floor_load_levels
+        known_before = None if before is None or state.floor is None else before.floor
+        floor, load_levels = known_before, 0.0 if before is None else before.floor_load_levels
         if contact.any() and not state.weak_at and Flag.LOW_CONFIDENCE not in state.flags:
             # Together with what was known: each step may seem to shrink a little, and many must not add up.
-            known_before = None if before is None or state.floor is None else before.floor
             floor, load_levels = contact if known_before is None else contact | known_before, state.load_levels
         elif before is not None and self._confirms(contact, before.contact):
             floor = before.contact if floor is None else floor | before.contact

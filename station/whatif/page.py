@@ -141,7 +141,7 @@ def _followed(
     reference: cv2.typing.MatLike, steps: Sequence[cv2.typing.MatLike | None], segmentation: Segmentation
 ) -> Contact | None:
     """Measure the last step's contact as the last of its press; None if an image is not stored any more."""
-    tracker = PressTracker(make_method([np.asarray(reference, np.uint8)], segmentation))
+    tracker = PressTracker(make_method(np.asarray(reference, np.uint8), segmentation))
     contact = None
     for image in steps:
         if image is None:

@@ -43,7 +43,7 @@ def remeasured(stored: StoredPress, own: Segmentation, draft: Segmentation) -> P
     missing = [step for step in range(len(press.points)) if step not in decoded]
     if reference is None or missing:
         raise CannotRemeasureError(messages.IMAGES_NOT_KEPT())
-    before, after = (PressTracker(make_method([reference], one)) for one in (own, draft))
+    before, after = (PressTracker(make_method(reference, one)) for one in (own, draft))
     measured = [_measured(press, step, decoded, before, after, draft) for step in range(len(press.points))]
     # The station counts the closing from the first firm contact, never from a weak one.
     onset = next((step for step, (_, is_firm) in enumerate(measured) if is_firm), None)

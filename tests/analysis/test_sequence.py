@@ -19,6 +19,7 @@ from station.settings.segmentation import Segmentation
 from station.twin.digit.press import render_press
 from station.twin.fruit import Kind
 from station.vision.contact import Contact, StageSink, contact_from_mask
+from station.vision.median import median_image
 from station.vision.methods import make_method
 from station.vision.press import PressTracker
 from station.vocabulary import Flag
@@ -64,7 +65,7 @@ def add_press(place: Path, kind: Kind, seed: int) -> Path:
 def followed(references: Sequence[np.ndarray], frames: Sequence[np.ndarray]) -> list[Contact]:
     """The contacts of frames that are measured as one press."""
     segmentation = BLUEBERRY.segmentation
-    tracker = PressTracker(make_method(references, segmentation))
+    tracker = PressTracker(make_method(median_image(references), segmentation))
     return [tracker.measure_step([frame]) for frame in frames]
 
 

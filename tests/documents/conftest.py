@@ -28,6 +28,7 @@ from station.twin.damage import Damage
 from station.twin.digit.press import PressOptions, PressSequence, render_press
 from station.twin.fruit import draw_fruit
 from station.twin.gel import MM_PER_PX
+from station.vision.median import median_image
 from station.vision.methods import make_method
 from station.vision.press import PressTracker
 
@@ -261,7 +262,7 @@ async def _inspect(folder: Path, fruit: int) -> None:
 
 def _pressed(shown: PressSequence, recipe, size: FruitSize) -> Press:
     """Measure its frames one after the other until the recipe stops the press."""
-    method = make_method(shown.references, recipe.segmentation)
+    method = make_method(median_image(shown.references), recipe.segmentation)
     tracker = PressTracker(method)
     count_mm = GripperCalibration().mm_per_count
     press = Press(shown.widths_mm[0], 0.1, (), size=size, resolution_mm=count_mm, scale_uncertainty=0.0125)

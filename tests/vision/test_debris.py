@@ -8,6 +8,7 @@ from station.studies.cohort import member
 from station.twin.digit.press import PressOptions, render_press
 from station.twin.digit.sensor import Condition, DigitSensor
 from station.vision.debris import Debris
+from station.vision.median import median_image
 from station.vision.robust import RobustMethod
 from station.vision.working import resized
 from station.vocabulary import Flag
@@ -81,7 +82,7 @@ def test_debris_that_has_moved_is_hardly_ever_trusted():
         references = [sensor.frame(None, k / 30, before) for k in range(5)]
         frame = sensor.frame(None, 1.0, after)
         for found, without in ((doubtful, frozenset()), (without_debris, frozenset({"debris"}))):
-            contact = RobustMethod(references, RobustParameters(), without=without).measure(frame)
+            contact = RobustMethod(median_image(references), RobustParameters(), without=without).measure(frame)
             found.append(not contact.found or Flag.LOW_CONFIDENCE in contact.flags)
     assert sum(doubtful) >= 9 > sum(without_debris)
 
@@ -91,7 +92,7 @@ def test_a_contact_on_debris_is_measured_without_it(kind, first_seed, closing_mm
     ratios = []
     for seed in range(first_seed, first_seed + 5):
         press = render_press(kind, seed, (closing_mm,), PressOptions(condition=Condition(dirt=3)))
-        contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
+        contact = RobustMethod(median_image(press.references), RobustParameters()).measure(press.frames[0])
         ratios.append(contact.area_px / np.count_nonzero(press.true_masks[0]))
     assert np.median(ratios) == pytest.approx(1, rel=0.25)
 
@@ -100,7 +101,7 @@ def test_with_a_dead_led_a_contact_over_most_of_the_field_is_not_taken_for_drift
     ratios = []
     for seed in range(5):
         press = render_press("rubber_ball", seed, (7.0,), PressOptions(condition=Condition(dead_led="red")))
-        contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[0])
+        contact = RobustMethod(median_image(press.references), RobustParameters()).measure(press.frames[0])
         ratios.append(contact.area_px / np.count_nonzero(press.true_masks[0]))
     assert np.median(ratios) == pytest.approx(1, rel=0.1)
 
@@ -109,6 +110,6 @@ def test_a_blueberry_over_most_of_the_field_is_not_taken_for_drift():
     ratios = []
     for number in range(91, 96):
         press = member("blueberry", 2025, number).press()
-        contact = RobustMethod(press.references, RobustParameters()).measure(press.frames[16])
+        contact = RobustMethod(median_image(press.references), RobustParameters()).measure(press.frames[16])
         ratios.append(contact.area_px / np.count_nonzero(press.true_masks[16]))
     assert np.median(ratios) == pytest.approx(1, rel=0.1)

@@ -14,6 +14,7 @@ from station.twin.digit.loaded import band_share
 from station.twin.digit.press import render_press
 from station.twin.digit.sensor import Condition, DigitSensor
 from station.twin.fruit import draw_fruit
+from station.vision.median import median_image
 from station.vision.press import PressTracker
 from station.vision.robust import RobustMethod
 from station.vocabulary import Flag
@@ -37,7 +38,7 @@ class SoftPress(NamedTuple):
     steps: list[Step]
 
     def tracker(self):
-        return PressTracker(RobustMethod(self.references, PARAMETERS))
+        return PressTracker(RobustMethod(median_image(self.references), PARAMETERS))
 
 
 def drawn(seed):
@@ -148,7 +149,7 @@ def test_a_lower_bound_is_no_more_than_the_truth(presses, followed):
 def test_bands_at_the_border_that_brighten_with_the_load_are_background_and_no_contact():
     for seed in SEEDS:
         _, sensor = drawn(seed)
-        method = RobustMethod([sensor.frame(None, number / 30) for number in range(5)], PARAMETERS)
+        method = RobustMethod(median_image([sensor.frame(None, number / 30) for number in range(5)]), PARAMETERS)
         tracker = PressTracker(method)
         # The dent is wide and even, as of a gel that is pushed as a whole: nothing of it is an edge.
         for number, bands_levels in enumerate((5.0, 15.0, 30.0)):
@@ -199,7 +200,7 @@ class Counting:
 @pytest.mark.parametrize("frames", [3, 1])
 def test_a_frame_that_is_measured_ahead_is_not_measured_again(presses, frames):
     one = presses[0]
-    counting = Counting(RobustMethod(one.references, PARAMETERS))
+    counting = Counting(RobustMethod(median_image(one.references), PARAMETERS))
     ahead, plain = PressTracker(counting), one.tracker()
     for step in one.steps[2:5]:
         taken = step.frames[:frames]
@@ -212,10 +213,21 @@ def test_a_frame_that_is_measured_ahead_is_not_measured_again(presses, frames):
 def test_a_press_may_go_on_from_a_contact_that_an_approach_has_measured(presses, followed):
     one = presses[0]
     approach = one.tracker().measure_step(one.steps[4].frames)
-    method = RobustMethod(one.references, PARAMETERS)
+    method = RobustMethod(median_image(one.references), PARAMETERS)
     tracker = PressTracker(method, first=approach)
     for step, contact in zip(one.steps[5:], followed[0][5:], strict=True):
         assert tracker.measure_step(step.frames).area_px == pytest.approx(contact.area_px, rel=0.1)
+
+
+@pytest.mark.parametrize(("kind", "most"), [("blueberry", 1.02), ("rubber_ball", 1.02), ("raspberry", 1.08)])
+def test_a_fruit_at_rest_does_not_grow_from_step_to_step(kind, most):
+    seen = render_press(kind, 7, (3.0,) * 8)
+    method = RobustMethod(median_image(seen.references), PARAMETERS)
+    tracker = PressTracker(method)
+    followed = [tracker.measure_step([frame]) for frame in seen.frames]
+    alone_px = [method.measure(frame).area_px for frame in seen.frames]
+    assert all(Flag.LOW_CONFIDENCE not in contact.flags for contact in followed)
+    assert followed[-1].area_px == pytest.approx(max(alone_px), rel=most - 1)
 
 
 def test_each_tracker_follows_its_own_press(presses):
@@ -235,7 +247,7 @@ def test_each_tracker_follows_its_own_press(presses):
 def test_a_doubtful_step_returns_at_least_what_the_step_before_did_until_the_body_is_let_go():
     doubting = RobustParameters(least_confidence=1.0)
     one = press(0, covered=(0.3, 0.25, 0.0))
-    tracker = PressTracker(RobustMethod(one.references, doubting))
+    tracker = PressTracker(RobustMethod(median_image(one.references), doubting))
     larger, smaller, released = (tracker.measure_step(step.frames[:1]) for step in one.steps)
     assert Flag.LOW_CONFIDENCE in larger.flags
     assert Flag.LOWER_BOUND not in larger.flags
@@ -258,7 +270,7 @@ def test_the_area_of_a_body_too_faint_for_an_edge_rises_with_what_has_changed():
     foam = SoftBody(SoftKind.FOAM, 3, (40.0, 40.0), Foundation(plateau_mpa=0.02, knee_mm=0.2, hardening_per_mm=0.2))
     contact, sensor = SoftOnGel(foam, Pose(240, 320)), DigitSensor(3, 503)
     references = [sensor.frame(None, number / 30) for number in range(5)]
-    tracker = PressTracker(RobustMethod(references, PARAMETERS))
+    tracker = PressTracker(RobustMethod(median_image(references), PARAMETERS))
     found = []
     for number, share in enumerate(COVERED[4:-2]):
         dent = contact.pressed(contact.compression_mm(share)).dent
@@ -271,7 +283,7 @@ def test_the_area_of_a_body_too_faint_for_an_edge_rises_with_what_has_changed():
 def test_a_soft_fruit_without_a_trusted_edge_is_returned_as_large_as_it_is_drawn_and_not_as_what_has_changed():
     soft = replace(draw_fruit("strawberry", 20_000), bruised=True)
     seen = render_press(soft, 20_000, (0.1, 0.2, 0.4, 0.8))
-    tracker = PressTracker(RobustMethod(seen.references, PARAMETERS))
+    tracker = PressTracker(RobustMethod(median_image(seen.references), PARAMETERS))
     found = [tracker.measure_step([frame]) for frame in seen.frames][2:]
     assert all({Flag.LOW_CONFIDENCE, Flag.LOWER_BOUND} <= one.flags for one in found)
     assert all(one.changed_area_px is not None and one.changed_area_px < 0.1 * one.area_px for one in found)

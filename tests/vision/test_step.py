@@ -12,7 +12,7 @@ from station.vocabulary import Flag
 
 def test_one_frame_is_measured_as_it_is(sphere_press):
     press = sphere_press()
-    method = RobustMethod([press.reference], RobustParameters())
+    method = RobustMethod(press.reference, RobustParameters())
     alone = method.measure(press.image)
     step = measure_step(method, [press.image])
     assert (step.area_px, step.confidence, step.flags) == (alone.area_px, alone.confidence, alone.flags)
@@ -21,7 +21,7 @@ def test_one_frame_is_measured_as_it_is(sphere_press):
 def test_frames_that_agree_keep_the_confidence_and_their_mean_is_measured(sphere_press, overlap):
     frames = [sphere_press(seed=seed).image for seed in range(3)]
     press = sphere_press()
-    method = RobustMethod([press.reference], RobustParameters())
+    method = RobustMethod(press.reference, RobustParameters())
     step = measure_step(method, frames)
     assert overlap(step.mask, press.truth) > 0.85
     assert step.area_px == method.measure(mean_image(frames)).area_px
@@ -32,7 +32,7 @@ def test_frames_that_agree_keep_the_confidence_and_their_mean_is_measured(sphere
 
 def test_frames_that_disagree_are_doubted_and_flagged(sphere_press):
     press = sphere_press()
-    method = RobustMethod([press.reference], RobustParameters())
+    method = RobustMethod(press.reference, RobustParameters())
     frames = [sphere_press(radius_px=radius).image for radius in (40, 70, 100)]
     step = measure_step(method, frames)
     assert step.area_px > 0
@@ -54,7 +54,7 @@ def test_the_mean_is_rounded():
 
 
 def test_a_step_without_frames_is_refused(sphere_press):
-    method = RobustMethod([sphere_press().reference], RobustParameters())
+    method = RobustMethod(sphere_press().reference, RobustParameters())
     with pytest.raises(ValueError, match="at least one"):
         measure_step(method, [])
 
@@ -72,7 +72,7 @@ class Counting:
 
 def test_frames_that_are_measured_already_are_not_measured_again(sphere_press):
     frames = [sphere_press(seed=seed).image for seed in range(3)]
-    method = RobustMethod([sphere_press().reference], RobustParameters())
+    method = RobustMethod(sphere_press().reference, RobustParameters())
     counting = Counting(method)
     known = {id(frame): method.measure(frame) for frame in frames[:2]}
     step = measure_step(counting, frames, known=known)
@@ -84,7 +84,7 @@ def test_frames_that_are_measured_already_are_not_measured_again(sphere_press):
 
 def test_a_lone_frame_that_is_measured_already_is_not_measured_again(sphere_press):
     frame = sphere_press().image
-    method = RobustMethod([sphere_press().reference], RobustParameters())
+    method = RobustMethod(sphere_press().reference, RobustParameters())
     counting = Counting(method)
     contact = measure_step(counting, [frame], known={id(frame): method.measure(frame)})
     assert contact.found
@@ -93,7 +93,7 @@ def test_a_lone_frame_that_is_measured_already_is_not_measured_again(sphere_pres
 
 def test_every_measurement_of_a_step_follows_the_step_before(sphere_press):
     frames = [sphere_press(seed=seed).image for seed in range(3)]
-    counting = Counting(RobustMethod([sphere_press().reference], RobustParameters()))
+    counting = Counting(RobustMethod(sphere_press().reference, RobustParameters()))
     before = counting.method.measure(frames[0])
     measure_step(counting, frames, before)
     assert len(counting.measured) == 4

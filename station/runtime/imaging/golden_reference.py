@@ -43,7 +43,7 @@ class GoldenReference:
                 data,
                 segmentation,
                 PreparedReference(
-                    image.shape, sharpness(image), light(image), make_method([image], segmentation), renewal
+                    image.shape, sharpness(image), light(image), make_method(image, segmentation), renewal
                 ),
             )
         return self._prepared[2]

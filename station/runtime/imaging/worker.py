@@ -63,7 +63,7 @@ class VisionWorker:
             image = reference_image(frames)
             properties = check_reference(image, self._golden.prepared(segmentation), self._settings)
             self._golden.store_first(image)
-            self._measurement = PressMeasurement(make_method([image], segmentation))
+            self._measurement = PressMeasurement(make_method(image, segmentation))
             return image, properties
 
         return await self._do(take)

@@ -243,7 +243,7 @@ class PanelMaintenance:
             picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
             if picture is None:
                 return None, messages.GOLDEN_UNREADABLE(file=path.name)
-            self._method = key, make_method([np.asarray(picture, np.uint8)], segmentation)
+            self._method = key, make_method(np.asarray(picture, np.uint8), segmentation)
         try:
             return self._method[1].measure(image), None
         except ValueError:

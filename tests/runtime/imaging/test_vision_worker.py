@@ -14,6 +14,7 @@ from station.runtime.imaging.worker import VisionWorker
 from station.settings.recipe import find_recipe
 from station.settings.service import ReferenceSettings
 from station.state_files import StateFiles
+from station.vision.median import median_image
 from station.vision.methods import make_method
 from station.vision.press import PressTracker
 from station.vision.step import measure_step
@@ -46,7 +47,7 @@ def seen_images(monkeypatch, previous_contacts):
     seen: list[int] = []
 
     def counting(references, segmentation):
-        method = make_method(references, segmentation)
+        method = make_method(median_image(references), segmentation)
 
         def measure(image, on_stage=None, previous=None, agreed=1.0, *, firm_only=False):
             seen.append(id(image))
@@ -76,7 +77,7 @@ def test_a_step_whose_frames_were_measured_as_they_came_is_measured_the_same_and
     assert seen_images[:3] == [id(each.image) for each in frames]
     assert len(seen_images) == 4  # and their mean
     median = np.median([each.image for each in references], axis=0).astype(np.uint8)
-    method = make_method([median], BLUEBERRY.segmentation)
+    method = make_method(median, BLUEBERRY.segmentation)
     plain = measure_step(method, [each.image for each in frames])
     assert plain.found
     assert (seen.contact.area_px, seen.contact.confidence) == (plain.area_px, plain.confidence)
@@ -128,7 +129,7 @@ def test_a_press_is_followed_from_its_first_contact_until_the_next_reference(tmp
     assert len(previous_contacts) == len(expected), "no frame was measured twice"
     assert all(one is other for one, other in zip(previous_contacts, expected, strict=True))
     median = np.median([frame(seed).image for seed in range(3)], axis=0).astype(np.uint8)
-    tracker = PressTracker(make_method([median], BLUEBERRY.segmentation), first=contacts[0])
+    tracker = PressTracker(make_method(median, BLUEBERRY.segmentation), first=contacts[0])
     again = [tracker.measure_step([each.image for each in frames]) for frames in steps[2:]]
     assert [one.area_px for one in again] == [one.area_px for one in contacts[1:]]
     assert [one.confidence for one in again] == [one.confidence for one in contacts[1:]]
