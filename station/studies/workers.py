@@ -3,16 +3,14 @@
 A sample's numbers depend on its task alone, so neither the place nor the number of workers changes them.
 """
 
-import ctypes
 import multiprocessing
-import os
 import signal
-import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 from typing import NoReturn, TypeVar
 
+from station.child_process import worker_processes
 from station.dask_client import connect
 from station.errors import BadInputError, StationError
 from station.memory import keep_freed_memory
@@ -21,8 +19,6 @@ from station.studies.sample import SampleResult, Task, measure_sample
 
 One = TypeVar("One")
 Answer = TypeVar("Answer")
-
-_PR_SET_PDEATHSIG = 1
 
 
 def on_this_machine(work: Callable[[One], Answer], tasks: Sequence[One], jobs: int) -> Iterator[Answer]:
@@ -41,10 +37,7 @@ def on_this_machine(work: Callable[[One], Answer], tasks: Sequence[One], jobs: i
     if jobs == 1 or len(tasks) < 2:
         yield from map(work, tasks)
         return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(
-        min(jobs, len(tasks)), mp_context=context, initializer=_tied_to, initargs=(os.getpid(),)
-    ) as pool:
+    with worker_processes(min(jobs, len(tasks))) as pool:
         try:
             for future in as_completed([pool.submit(work, task) for task in tasks]):
                 yield future.result()
@@ -66,15 +59,6 @@ def stop_on_sigterm() -> None:
         raise KeyboardInterrupt
 
     signal.signal(signal.SIGTERM, interrupt)
-
-
-def _tied_to(parent: int) -> None:
-    """Leave Ctrl-C to the parent, and end with it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != parent:
-            os._exit(1)
 
 
 def on_cluster(tasks: Sequence[Task], address: str) -> Iterator[SampleResult]:

@@ -1,9 +1,8 @@
 """Runner of a what-if: many inspections judged again on all cores, or on a Dask cluster."""
 
-import multiprocessing
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from itertools import islice
@@ -12,6 +11,7 @@ from typing import Any, NamedTuple
 
 import cv2
 
+from station.child_process import worker_processes
 from station.dask_client import connect
 from station.errors import StationError
 from station.messages import whatif as messages
@@ -95,8 +95,7 @@ def _on_cores(parts: Iterator[Batch], jobs: int) -> Iterator[list[Replayed]]:
             break
     else:
         return
-    # Spawned, since OpenCV's threads do not survive a fork.
-    with ProcessPoolExecutor(jobs - 1, multiprocessing.get_context("spawn")) as pool:
+    with worker_processes(jobs - 1) as pool:
         yield from _flow(parts, lambda batch: pool.submit(replay_batch, batch), (jobs - 1) * _AHEAD, helps=True)
 
 

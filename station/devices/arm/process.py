@@ -7,7 +7,6 @@ the kernel kills it when the parent dies, which works even while ur-rtde holds t
 
 import asyncio
 import ctypes
-import os
 import signal
 import sys
 import time
@@ -18,6 +17,7 @@ from rtde_control import RTDEControlInterface
 from rtde_receive import RTDEReceiveInterface
 
 from station.channel.server import ChannelServer
+from station.child_process import end_with
 from station.devices.arm.age import TimestampAge
 from station.devices.arm.diagnosis import PLAYING
 from station.devices.arm.messages import (
@@ -42,8 +42,8 @@ VARIABLES = ["timestamp", "actual_q", "actual_qd", "robot_mode", "safety_status_
 UPLOAD_S = 2.0
 POLL_S = 0.01
 KICKS_PER_LIMIT = 4
-PR_SET_PDEATHSIG, PR_SET_TIMERSLACK = 1, 29
-"""Numbers: prctl(2)."""
+PR_SET_TIMERSLACK = 29
+"""prctl(2)."""
 TIMER_SLACK_NS = 1_000_000
 """Half of the controller's fastest cycle: the longest delay between a state's arrival and its use."""
 
@@ -232,13 +232,6 @@ class UrRtdeProcess:
         return Outcome(done=done)
 
 
-def die_with(parent: int) -> None:
-    """Have the kernel kill this process when the one that started it ends."""
-    ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os._exit(1)
-
-
 def relax_timers() -> None:
     """Let the kernel wake this thread, and all that it starts from now on, a little later than requested.
 
@@ -270,7 +263,7 @@ async def serve(endpoint: str, host: str, frequency_hz: float) -> None:
 def main() -> None:
     """Run the process; its arguments are the endpoint, the controller's host, the frequency and the parent's id."""
     endpoint, host, frequency_hz, parent = sys.argv[1:]
-    die_with(int(parent))
+    end_with(int(parent))
     relax_timers()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     asyncio.run(serve(endpoint, host, float(frequency_hz)))
