@@ -18,8 +18,9 @@ NONE_STALE = "no outcome of another fruit is used"
 NONE_DOUBLED = "no outcome is shown twice or changed"
 WHOLE_PRESS = "no PASS without a whole trusted press"
 NOTHING_MOVES = "nothing moves in a held state"
+NONE_TAKEN = "no fruit is moved while the jaws may hold it"
 ALARMS_RETURN = "alarms return to normal, and the line runs again"
-LAWS = (ONE_OUTCOME, NONE_STALE, NONE_DOUBLED, WHOLE_PRESS, NOTHING_MOVES, ALARMS_RETURN)
+LAWS = (ONE_OUTCOME, NONE_STALE, NONE_DOUBLED, WHOLE_PRESS, NOTHING_MOVES, NONE_TAKEN, ALARMS_RETURN)
 
 HELD = {State.UNKNOWN, State.STOPPED, State.HELD, State.CARRIED, State.LATCHED, State.RECORDING_LATCHED}
 """States in which no motion is under way."""
@@ -103,6 +104,12 @@ class Laws:
         ends = before in _FOR_A_PERSON and after not in _FOR_A_PERSON
         if ends and event is not Event.PERSON_CONFIRMED:
             raise LawBrokenError(NOTHING_MOVES, f"{before} is left by {event}, without a person")
+
+    @staticmethod
+    def moved(number: int, *, jaws_open: bool) -> None:
+        """The line has moved a fruit out of the nest."""
+        if not jaws_open:
+            raise LawBrokenError(NONE_TAKEN, f"fruit {number}")
 
     def ended(self, counted_doubled: int) -> None:
         """All troubles are over, and the line has come to rest."""

@@ -85,6 +85,7 @@ class _World:
         self._program = LineProgram(_Plan(tuple(each for each in story.troubles if each.part == "plc")), lot="VIRTUAL")
         self._inputs: dict[str, Any] | None = None
         self._decided = self._wanted = self._fruits = 0
+        self._leaves = False  # the fruit in the nest is decided
         self._came_s = 0.0
 
     def run(self) -> None:
@@ -153,16 +154,17 @@ class _World:
         self.clock.after(SCAN_S, self._scan)
         if self._devices.trouble("plc") == "pause":
             return
-        fruit = self._cell.fruit
-        if fruit is None and self._program.free and self._fruits < self._wanted:
+        if self._program.free and self._fruits < self._wanted:
+            self._take_away()  # the next one pushes it out
             self._fruits += 1
             fruit = draw_fruit(self._fruits, self._rng)
             if self._fruits > self._story.fruits:
                 fruit = Fruit(self._fruits, 35.0, 26.0, off_middle=False)
             self._cell.fruit = fruit
             self._came_s = self.clock.s
+        waits = self._cell.fruit is not None and not self._leaves
         encoder = int(self.clock.s * 1000)
-        outputs = self._program.scan(self._inputs, self.clock.s, fruit_in_nest=fruit is not None, encoder=encoder)
+        outputs = self._program.scan(self._inputs, self.clock.s, fruit_in_nest=waits, encoder=encoder)
         interface = self._interface
         if not interface.alive:
             self._inputs = None
@@ -177,7 +179,14 @@ class _World:
             self._laws.passed(passage)
             self._note(str(passage.decision))
             self._decided += 1
-            self._cell.fruit = None
+            self._leaves = True
+        if self._program.may_move:
+            self._take_away()
+
+    def _take_away(self) -> None:
+        if self._leaves and self._cell.fruit is not None:
+            self._laws.moved(self._cell.fruit.number, jaws_open=self._cell.jaws_open)
+            self._cell.fruit, self._leaves = None, False
 
     def _note(self, decision: str) -> None:
         self._report.triggers += 1

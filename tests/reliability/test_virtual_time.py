@@ -11,6 +11,7 @@ from benchmarks.virtual.play import play
 from benchmarks.virtual.story import Story, Trouble, draw, shrink
 from plc_interface.handshake import inputs
 from plc_interface.handshake.journal import Journal
+from plc_interface.plc_simulator.program import LineProgram
 from station.inspection.cycle import TABLE, UNJUDGED, Action, Event, Transition
 from station.inspection.judge import Judgement
 from station.inspection.press import Press
@@ -129,6 +130,11 @@ def test_a_judge_that_passes_everything_is_found(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(actions, "judged", kind)
     assert found(laws.WHOLE_PRESS).troubles == ()
+
+
+def test_a_program_that_takes_a_fruit_away_at_the_decision_is_found(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(LineProgram, "may_move", property(lambda _: True))
+    assert len(found(laws.NONE_TAKEN).troubles) <= 1
 
 
 def found(law: str) -> Story:
