@@ -30,7 +30,7 @@ class RecordsSettings(Settings):
         title="Images' quota",
         description=(
             "Space for images (megabytes). Beyond it the oldest of accepted fruit are removed first, then the oldest "
-            "of rejected; 0 stores none. An inspection's images take about 5 MB."
+            "of rejected; 0 stores none. An inspection's images take about 1.5 MB."
         ),
         unit="MB",
         ge=0,
