@@ -17,7 +17,7 @@ from station.vision.reference_check import ReferenceCheck
 from station.vision.working import clipped, resized, working_image
 
 TWIN_PAIRS = range(91_000, 91_100)
-"""As `./run bench measurement` has them."""
+"""Seeds of the pairs on which the thresholds were chosen."""
 FOGGED_UNITS = (None, *range(900, 924))
 FOGS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
 _FOGGED_AFTER_S = 8.0

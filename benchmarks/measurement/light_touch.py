@@ -25,7 +25,7 @@ from station.vision.step import mean_image
 
 DETECTION_PLACES = ((240.0, 320.0), (120.0, 160.0), (360.0, 480.0), (120.0, 480.0), (360.0, 160.0))
 DETECTION_UNITS = (None, 7)
-DETECTION_SEED = 500
+DETECTION_SEED = 102_000
 LIGHT_AREAS_MM2 = (1, 2, 3, 5, 10)
 BOUND_DRAWS = 24
 BOUND_COSINES = 6

@@ -14,7 +14,7 @@ from station.vision.robust import RobustMethod
 from station.vision.step import mean_image, measure_step
 from station.vocabulary import Flag
 
-UNITS = range(32000, 32060)
+UNITS = range(93_000, 93_060)
 """Nothing was chosen on them."""
 CONDITIONS = ("plain", "drift doubled", "dead LED", "dirt on the gel")
 AFTER_S = (1.0, 3.0, 5.0, 7.0, 9.0, 11.0)

@@ -36,6 +36,8 @@ _DECIDED_BY = (
     "vision",
     "press",
     "studies/gauge_grip.py",
+    "studies/simulated_rig.py",
+    "settings/gripper.py",
     *(
         f"twin/{name}"
         for name in ("contact.py", "damage.py", "fruit.py", "gel.py", "squeeze.py", "texture.py", "digit")
@@ -201,8 +203,9 @@ def made_by(recipe: Recipe) -> str:
         recipe: by which it is.
     """
     root = Path(station.__file__).parent
-    digest = hashlib.sha256(Path(__file__).with_name("specimens.py").read_bytes())
-    digest.update(Path(__file__).with_name("sweep.py").read_bytes())
+    digest = hashlib.sha256(Path(__file__).read_bytes())
+    for name in ("specimens.py", "sweep.py"):
+        digest.update(Path(__file__).with_name(name).read_bytes())
     way = f"{recipe.steps.measured}{recipe.steps.step_mm}{recipe.gripper!r}{steps_to_decide(recipe)}"
     digest.update(f"{way}{recipe.segmentation!r}{recipe.imaging!r}".encode())
     for name in _DECIDED_BY:

@@ -121,6 +121,8 @@ class State:
     """At the input's size, 0 or 255."""
     contact: Mask = field(init=False)
     """What this step itself shows of it, with the floor, at half the working size, 0 or 1."""
+    contact_px: int = 0
+    """Its area as drawn, in pixels of half the working size; `contact` has only those that it covers wholly."""
     flags: set[Flag] = field(default_factory=set)
     confidence: float = 0.0
     agreed: float = 1.0
@@ -407,6 +409,7 @@ class RobustMethod:
         # Whole pixels only, so that what is handed on lies within the mask.
         covered = cv2.resize(state.mask, (shape[1], shape[0]), interpolation=cv2.INTER_AREA)
         state.contact = np.asarray(covered == 255, np.uint8)
+        state.contact_px = round(cv2.countNonZero(state.mask) * state.contact.size / state.mask.size)
 
     def _keep_least(self, state: State) -> None:
         """Return at least what the step before did where no edge is trusted: compression only rises."""
@@ -450,7 +453,7 @@ class RobustMethod:
             state.confidence *= state.agreed
         if state.weak_at:
             state.confidence *= _WEAK_DOUBT
-        moved = touched and state.floor is None and self._debris.may_be(state.gate, cv2.countNonZero(state.contact))
+        moved = touched and state.floor is None and self._debris.may_be(state.gate, state.contact_px)
         if Flag.REFERENCE_MISMATCH in flags or (moved and "debris" not in self._without):
             state.confidence = 0.0
         if state.confidence < self._parameters.least_confidence:

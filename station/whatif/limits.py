@@ -83,16 +83,16 @@ def marked_fruit(press: Press, recipe: Recipe, closing_mm: float, *, good: bool,
     limit or the growth, which the draft keeps, has proven it damaged or lets it pass no more.
 
     Args:
-        recipe: that it was pressed by.
-        draft: the recipe that the limit is proposed for.
+        recipe: that it was pressed by, whose early stop may have ended its steps.
+        draft: the recipe that the limit is proposed for: its size rule, and its guard band.
     """
-    limits = sized_limits(press, recipe)
+    limits = sized_limits(press, draft)
     evidence = Evidence(press, limits)
     if press.interruptions or not evidence.points:
         return None
     area = evidence.area_at(closing_mm)
     if area is not None:
-        passes = judge(press, _with_largest_limits(recipe, closing_mm)).outcome == "PASS"
+        passes = judge(press, _with_largest_limits(draft, closing_mm)).outcome == "PASS"
         return MarkedFruit(good, sum(area) if passes else math.inf, area[0], limits.length_mm)
     if early_stop(press, recipe) is None:
         return None

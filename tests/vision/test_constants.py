@@ -1,5 +1,8 @@
 """Every constant of the robust method states its unit, grid, meaning and origin, and is used."""
 
+import os
+import subprocess
+import sys
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -9,6 +12,7 @@ import station.vision
 from benchmarks.fit.fixed import fixed_numbers, table
 from station.vision.constants import CONSTANTS, Constants
 
+ROOT = Path(__file__).resolve().parents[2]
 SOURCES = {
     path.name: path.read_text()
     for folder in station.vision.__path__
@@ -49,3 +53,27 @@ def test_the_document_has_every_other_number():
     page = (Path(__file__).resolve().parents[2] / "docs" / "robust-constants.md").read_text(encoding="utf-8")
     missing = [line for line in table() if line not in page]
     assert missing == [], "renew the page: ./run bench fit --evaluate"
+
+
+SEEDS_TOLD = """
+from fit.parts import SEEDS
+from fit.reference import TWIN_PAIRS
+from fit.reliability import FIRST_SEEDS
+from measurement import at_the_border, light_touch, on_the_twin, references, soft_table, untouched
+
+print(*(seed for part in SEEDS.values() for name, seed in part.items() if name != "noise"), TWIN_PAIRS.start)
+print(*on_the_twin.TWIN_SEEDS, *on_the_twin.BRUISED_SEEDS, *FIRST_SEEDS.values(), at_the_border.BORDER_SEED)
+print(soft_table.SEEDS.start, references.TWIN_SEEDS.start, untouched.UNITS.start, light_touch.DETECTION_SEED)
+"""
+
+
+def test_what_the_measurement_is_judged_on_shares_no_seed_with_the_fit():
+    """A set takes the seeds after its first one: by the thousand, which none exceeds."""
+    paths = os.pathsep.join([str(ROOT), str(ROOT / "benchmarks")])
+    told = subprocess.run(
+        [sys.executable, "-c", SEEDS_TOLD], env={**os.environ, "PYTHONPATH": paths}, check=True, capture_output=True
+    )
+    fitted, *judged = ({int(seed) // 1000 for seed in line.split()} for line in told.stdout.splitlines())
+    assert len(fitted) == 17
+    assert len(set().union(*judged)) == 10
+    assert fitted.isdisjoint(set().union(*judged))

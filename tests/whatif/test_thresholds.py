@@ -189,6 +189,13 @@ class TestWhatAPressSays:
         closings = (0.95, 1.9, 2.45, 3.0, 12.0)
         assert [least_area_at(self.RECIPE, each) for each in closings] == pytest.approx([12.5, 25.0, 38.5, 52.0, 52.0])
 
+    def test_a_limit_is_by_the_drafts_size_rule_and_guard_band_whatever_the_revision_had(self, changed):
+        sizeless = changed(self.RECIPE, damage__size=None)
+        loose = changed(sizeless, damage__uncertainty__coverage=0.5)
+        found = [marked_fruit(self.press(), own, 3.0, good=True, draft=self.RECIPE) for own in (self.RECIPE, loose)]
+        assert found[0] == found[1]
+        assert found[0] != marked_fruit(self.press(), self.RECIPE, 3.0, good=True, draft=loose)
+
     def test_a_limit_that_no_recipe_may_have_is_none(self):
         """Of a small fruit's large area: for a fruit of the reference length it is beyond what a recipe may say."""
         press = replace(self.press((8.0, 60.0, 100.0, 150.0)), onset_mm=22.0, size=FruitSize(length_mm=21.0))
