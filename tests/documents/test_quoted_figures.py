@@ -51,7 +51,7 @@ def test_the_readmes_compressed_draws_are_all_that_were_made_and_none_had_an_are
     kinds = ("JPEG 30", "JPEG 45", "JPEG 60", "video")
     assert [find(page, columns, kind, "with a false area") for kind in kinds] == ["0"] * 4
     draws = sum(int(find(page, columns, kind, "draws")) for kind in kinds)
-    assert said(text("README.md"), r"Nor has one of ([\d,]+) such draws an area") == [draws]
+    assert said(text("README.md"), r"None of ([\d,]+) such draws, compressed") == [draws]
 
 
 def test_the_readmes_error_of_the_area_is_the_range_of_the_sound_fruit(text):
