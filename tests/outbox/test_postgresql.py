@@ -232,6 +232,7 @@ def test_a_database_of_version_1_is_refused_with_the_remedy_which_makes_it_as_a_
             old.execute("DROP FUNCTION summarise_inspections() CASCADE; DROP FUNCTION bin_of")
             old.execute("DROP VIEW hourly_outcomes_of_growers, inspections_of_growers")
             old.execute("DROP TABLE hourly_outcomes, hourly_reasons, hourly_values")
+            old.execute("DROP INDEX audit_without_seals")
             old.execute("ALTER TABLE inspections DROP COLUMN fruit_length_mm, DROP COLUMN size_class")
             old.execute(
                 "CREATE VIEW inspections_of_growers AS SELECT i.*, l.grower FROM inspections i "

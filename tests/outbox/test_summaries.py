@@ -11,6 +11,7 @@ from station.outbox.feed import read_batch
 from station.outbox.postgresql import Postgresql
 from station.settings.outbox import OutboxPostgresqlSettings
 
+QUERIES = {panel.title: t["rawSql"] for panel in panels() for t in panel.targets if "rawSql" in t}
 MONTH = ("2026-01-01T00:00:00+00:00", "2026-01-31T23:59:59+00:00")
 EACH = {
     "hourly_outcomes": (
@@ -90,15 +91,27 @@ def test_a_published_inspection_that_is_published_again_is_counted_once(told):
 
 
 def test_the_dashboard_answers_what_the_inspections_say(told):
-    queries = {panel.title: t["rawSql"] for panel in panels() for t in panel.targets if "rawSql" in t}
     chosen = {"station": ["summed-1", "summed-2"], "fruit": ["strawberry", "raspberry"]}
-    titles = plain.STATEMENTS.keys() & queries.keys()
+    titles = plain.STATEMENTS.keys() & QUERIES.keys()
     assert len(titles) == 9
     with told.connect() as connection:
         for title in sorted(titles):
             ours, theirs = (
                 connection.execute(sql(text, *MONTH, **chosen).encode()).fetchall()
-                for text in (queries[title], plain.STATEMENTS[title])
+                for text in (QUERIES[title], plain.STATEMENTS[title])
             )
             assert theirs, title
             assert equal(ours, theirs, plain.MEDIAN_TOLERANCE if title in plain.MEDIANS else 1e-9), title
+
+
+def test_a_recipes_approval_is_listed_before_the_seals_of_later_fruit(server):
+    with server.connect() as connection:
+        connection.execute(
+            "INSERT INTO audit SELECT 'sealing', number, md5(number::text), '', 0, "
+            "'2026-01-05 12:00Z'::timestamptz + number * interval '1 s', 'station', 'station', "
+            "CASE number WHEN 0 THEN 'recipe.approved' ELSE 'inspection.sealed' END, 'subject ' || number, '', "
+            "NULL, NULL, 'test', number FROM generate_series(0, 200) AS number"
+        )
+        text = sql(QUERIES["Audit trail"], *MONTH, station=["sealing"])
+        rows = connection.execute(text.encode()).fetchall()
+    assert [row[3:5] for row in rows] == [("recipe.approved", "subject 0")]

@@ -83,9 +83,10 @@ REPLICATION = (
         "WHERE station IN (${station:sqlstring}) GROUP BY station ORDER BY 2"),
     sql("number", "Refused", "short", "Rows that this database could not take as they were: read the table `refused`.",
         "outbox.md", "SELECT count(*) AS refused FROM refused WHERE station IN (${station:sqlstring})"),
-    sql("table", "Audit trail", "none", "The last changes that people made.", "audit.md",
-        "SELECT at, station, who, action, subject, reason FROM audit "
-        "WHERE $__timeFilter(at) AND station IN (${station:sqlstring}) ORDER BY at DESC LIMIT 100"),
+    sql("table", "Audit trail", "none",
+        "The last commands and changes, by people, PLC and station; without the seals of inspections.", "audit.md",
+        "SELECT at, station, who, action, subject, reason FROM audit WHERE $__timeFilter(at) "
+        "AND action <> 'inspection.sealed' AND station IN (${station:sqlstring}) ORDER BY at DESC LIMIT 100"),
 )  # fmt: skip
 
 
