@@ -1,6 +1,7 @@
 """The peer of the summaries by hour: the same questions of the dashboard Quality, put to the inspections themselves."""
 
-HERE = "$__timeFilter(began) AND station IN (${station:sqlstring}) AND fruit IN (${fruit:sqlstring})"
+CHOSEN = "station IN (${station:sqlstring}) AND fruit IN (${fruit:sqlstring})"
+HERE = f"$__timeFilter(began) AND {CHOSEN}"
 FAILED = "count(*) FILTER (WHERE outcome = 'FAIL')::float / nullif(count(*) FILTER (WHERE outcome <> 'NO_RESULT'), 0)"
 UNJUDGED = "count(*) FILTER (WHERE outcome = 'NO_RESULT')::float / count(*)"
 GROWER = "coalesce(nullif(grower, ''), 'not told')"
@@ -9,7 +10,8 @@ LOT = "coalesce(nullif(lot, ''), 'not told')"
 STATEMENTS = {
     "Lots": f"""SELECT {LOT} AS lot, {GROWER} AS grower, fruit, station, min(began) AS began,
         count(*)::text AS inspected, {FAILED} AS failed, {UNJUDGED} AS "not judged"
-        FROM inspections_of_growers WHERE {HERE}
+        FROM inspections_of_growers WHERE {CHOSEN} AND (lot <> '' OR $__timeFilter(began))
+        AND (station, lot) IN (SELECT station, lot FROM inspections WHERE {HERE})
         GROUP BY 1, 2, fruit, station ORDER BY min(began) DESC LIMIT 200""",
     "Growers": f"""SELECT {GROWER} AS grower, fruit, count(*)::text AS inspected, {FAILED} AS failed
         FROM inspections_of_growers WHERE {HERE}

@@ -1,6 +1,7 @@
 """The summaries by hour are at all times what the inspections themselves say, and the dashboard's answers too."""
 
 import asyncio
+from datetime import UTC
 
 import pytest
 
@@ -102,6 +103,26 @@ def test_the_dashboard_answers_what_the_inspections_say(told):
             )
             assert theirs, title
             assert equal(ours, theirs, plain.MEDIAN_TOLERANCE if title in plain.MEDIANS else 1e-9), title
+
+
+@pytest.mark.parametrize(
+    ("lot", "inspected", "began", "failed"),
+    [("L7", "8", "09:05", 1 / 8), ("", "4", "10:05", 0.0)],
+)
+def test_a_lot_is_counted_whole_where_the_range_begins_within_it(server, lot, inspected, began, failed):
+    """Fruit without a lot, which has no begin and no end, is that of the range."""
+    with server.connect() as connection, connection.transaction(force_rollback=True):
+        connection.execute(
+            "INSERT INTO hourly_outcomes SELECT hour::timestamptz, 'halved', %s, 'blueberry', '', outcome, number, "
+            "hour::timestamptz + interval '5 min' FROM (VALUES ('2026-01-05 09:00Z', 'PASS', 3), "
+            "('2026-01-05 09:00Z', 'FAIL', 1), ('2026-01-05 10:00Z', 'PASS', 4)) AS two (hour, outcome, number)",
+            (lot,),
+        )
+        of_second = ("2026-01-05T10:00:00Z", "2026-01-05T10:59:59Z")
+        text = sql(QUERIES["Lots"], *of_second, station=["halved"], fruit=["blueberry"])
+        [(*_, at, counted, share, unjudged)] = connection.execute(text.encode()).fetchall()
+    assert (at.astimezone(UTC).strftime("%H:%M"), counted) == (began, inspected)
+    assert (share, unjudged) == (failed, 0.0)
 
 
 def test_a_recipes_approval_is_listed_before_the_seals_of_later_fruit(server):

@@ -6,7 +6,8 @@ from typing import Any
 from deploy.grafana.boards.panel import Panel, board, chosen, sql
 
 BETWEEN = "hour BETWEEN date_trunc('hour', $__timeFrom()::timestamptz) AND $__timeTo()::timestamptz"
-HERE = f"{BETWEEN} AND station IN (${{station:sqlstring}}) AND fruit IN (${{fruit:sqlstring}}) AND inspections > 0"
+CHOSEN = "station IN (${station:sqlstring}) AND fruit IN (${fruit:sqlstring}) AND inspections > 0"
+HERE = f"{BETWEEN} AND {CHOSEN}"
 ALL = "sum(inspections)"
 FAILED = (
     "coalesce(sum(inspections) FILTER (WHERE outcome = 'FAIL'), 0)::float "
@@ -40,11 +41,13 @@ def median(quantity: str, metric: str, unit: float, name: str) -> str:
 
 LOTS = (
     sql("table", "Lots", "percentunit",
-        "Each lot with its grower and what became of it; the newest on top. The lot's report is at the "
-        "station: `station records report NAME lot.html`.", "records.md",
+        "Each lot of the range, whole: also its fruit before and after the range; the newest on top. Fruit without a "
+        "lot is counted in the range. The lot's report is at the station: `station records report NAME lot.html`.",
+        "records.md",
         f"""SELECT {LOT} AS lot, {GROWER} AS grower, fruit, station, min(first_began) AS began,
         {ALL}::text AS inspected, {FAILED} AS failed, {UNJUDGED} AS "not judged"
-        FROM hourly_outcomes_of_growers WHERE {HERE}
+        FROM hourly_outcomes_of_growers WHERE {CHOSEN} AND (lot <> '' OR {BETWEEN})
+        AND (station, lot) IN (SELECT station, lot FROM hourly_outcomes WHERE {HERE})
         GROUP BY 1, 2, fruit, station ORDER BY min(first_began) DESC LIMIT 200""", width=24),
 )  # fmt: skip
 GROWERS = (
