@@ -2,6 +2,7 @@
 
 CHOSEN = "station IN (${station:sqlstring}) AND fruit IN (${fruit:sqlstring})"
 HERE = f"$__timeFilter(began) AND {CHOSEN}"
+DAY = "date_trunc('day', began, '$__timezone')"
 FAILED = "count(*) FILTER (WHERE outcome = 'FAIL')::float / nullif(count(*) FILTER (WHERE outcome <> 'NO_RESULT'), 0)"
 UNJUDGED = "count(*) FILTER (WHERE outcome = 'NO_RESULT')::float / count(*)"
 GROWER = "coalesce(nullif(grower, ''), 'not told')"
@@ -16,9 +17,9 @@ STATEMENTS = {
     "Growers": f"""SELECT {GROWER} AS grower, fruit, count(*)::text AS inspected, {FAILED} AS failed
         FROM inspections_of_growers WHERE {HERE}
         GROUP BY 1, fruit ORDER BY 4 DESC NULLS LAST""",
-    "Failed by grower and day": f"""SELECT date_trunc('day', began) AS time, {GROWER} AS metric, {FAILED} AS failed
+    "Failed by grower and day": f"""SELECT {DAY} AS time, {GROWER} AS metric, {FAILED} AS failed
         FROM inspections_of_growers WHERE {HERE} GROUP BY 1, 2 ORDER BY 1""",
-    "Outcomes by day": f"""SELECT date_trunc('day', began) AS time, outcome AS metric, count(*) AS fruit
+    "Outcomes by day": f"""SELECT {DAY} AS time, outcome AS metric, count(*) AS fruit
         FROM inspections WHERE {HERE} GROUP BY 1, 2 ORDER BY 1""",
     "Failed by fruit and hour": f"""SELECT date_trunc('hour', began) AS time, fruit AS metric, {FAILED} AS failed
         FROM inspections WHERE {HERE} GROUP BY 1, 2 ORDER BY 1""",

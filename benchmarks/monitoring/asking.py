@@ -54,17 +54,19 @@ def promql(expr: str, station: str, rate_interval: str, week: str = "1w") -> str
     return filled.replace("$station", station).replace("$fruit", ".+")
 
 
-def sql(text: str, begin: str, end: str, **variables: list[str]) -> str:
+def sql(text: str, begin: str, end: str, zone: str = "UTC", **variables: list[str]) -> str:
     """A dashboard's statement as Grafana sends it.
 
     Args:
         text: with macros and variables.
         begin: from when, ISO 8601.
         end: until when.
+        zone: the reader's time zone.
         variables: the chosen values of each.
     """
     filled = re.sub(r"\$__timeFilter\((\w+)\)", rf"\1 BETWEEN '{begin}' AND '{end}'", text)
     filled = filled.replace("$__timeFrom()", f"'{begin}'").replace("$__timeTo()", f"'{end}'")
+    filled = filled.replace("$__timezone", zone)
     for name, values in variables.items():
         quoted = ",".join("'" + value.replace("'", "''") + "'" for value in values)
         filled = filled.replace(f"${{{name}:sqlstring}}", quoted)

@@ -125,6 +125,22 @@ def test_a_lot_is_counted_whole_where_the_range_begins_within_it(server, lot, in
     assert (share, unjudged) == (failed, 0.0)
 
 
+@pytest.mark.parametrize("title", ["Outcomes by day", "Failed by grower and day"])
+@pytest.mark.parametrize(("zone", "midnight"), [("Europe/Berlin", "05 22:00"), ("utc", "05 00:00")])
+def test_a_day_is_the_readers(server, title, zone, midnight):
+    """At half past ten in the evening of UTC it is tomorrow in Berlin, in summer."""
+    with server.connect() as connection, connection.transaction(force_rollback=True):
+        connection.execute("SET LOCAL timezone = 'UTC'")
+        connection.execute(
+            "INSERT INTO hourly_outcomes VALUES ('2026-07-05 22:00Z', 'late', 'L7', 'blueberry', '', 'PASS', 1, "
+            "'2026-07-05 22:30Z')"
+        )
+        of_days = ("2026-07-04T00:00:00Z", "2026-07-07T00:00:00Z")
+        text = sql(QUERIES[title], *of_days, zone=zone, station=["late"], fruit=["blueberry"])
+        [(at, *_)] = connection.execute(text.encode()).fetchall()
+    assert at.astimezone(UTC).strftime("%d %H:%M") == midnight
+
+
 def test_a_recipes_approval_is_listed_before_the_seals_of_later_fruit(server):
     with server.connect() as connection:
         connection.execute(

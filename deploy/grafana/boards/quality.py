@@ -5,10 +5,12 @@ from typing import Any
 
 from deploy.grafana.boards.panel import Panel, board, chosen, sql
 
-BETWEEN = "hour BETWEEN date_trunc('hour', $__timeFrom()::timestamptz) AND $__timeTo()::timestamptz"
+BETWEEN = "hour BETWEEN date_trunc('hour', $__timeFrom()::timestamptz, 'UTC') AND $__timeTo()::timestamptz"
 CHOSEN = "station IN (${station:sqlstring}) AND fruit IN (${fruit:sqlstring}) AND inspections > 0"
 HERE = f"{BETWEEN} AND {CHOSEN}"
 ALL = "sum(inspections)"
+DAY = "date_trunc('day', hour, '$__timezone')"
+"""The reader's day: in the time zone in which Grafana shows it, whatever the database's is."""
 FAILED = (
     "coalesce(sum(inspections) FILTER (WHERE outcome = 'FAIL'), 0)::float "
     "/ nullif(sum(inspections) FILTER (WHERE outcome <> 'NO_RESULT'), 0)"
@@ -56,12 +58,12 @@ GROWERS = (
         FROM hourly_outcomes_of_growers WHERE {HERE}
         GROUP BY 1, fruit ORDER BY 4 DESC NULLS LAST""", width=12),
     sql("lines", "Failed by grower and day", "percentunit", "Share of the judged fruit.", "alarms.md#reject-rate",
-        f"""SELECT date_trunc('day', hour) AS time, {GROWER} AS metric, {FAILED} AS failed
+        f"""SELECT {DAY} AS time, {GROWER} AS metric, {FAILED} AS failed
         FROM hourly_outcomes_of_growers WHERE {HERE} GROUP BY 1, 2 ORDER BY 1""", width=12),
 )  # fmt: skip
 TRENDS = (
     sql("bars", "Outcomes by day", "short", "How many fruit.", "records.md",
-        f"""SELECT date_trunc('day', hour) AS time, outcome AS metric, {ALL}::bigint AS fruit
+        f"""SELECT {DAY} AS time, outcome AS metric, {ALL}::bigint AS fruit
         FROM hourly_outcomes WHERE {HERE} GROUP BY 1, 2 ORDER BY 1"""),
     sql("lines", "Failed by fruit and hour", "percentunit", "Share of the judged fruit.", "alarms.md#reject-rate",
         f"""SELECT hour AS time, fruit AS metric, {FAILED} AS failed
