@@ -142,15 +142,15 @@ define("chart.early", "early stop")
 define("chart.limit", "limit")
 define("chart.own", "this fruit")
 define_plural("chart.passed", "{n} passed", "{n} passed", "n")
-define_plural("chart.failed", "{n} rejected", "{n} rejected", "n")
+define_plural("chart.failed", "{n} failed", "{n} failed", "n")
 define("chart.no_past", "No fruit was inspected with this recipe yet.")
 define("chart.growth", "steepest growth, mm²/mm")
 define("chart.width", "width of the fruit, mm")
 define("chart.confidence", "confidence at the deciding closing")
 define_plural(
     "chart.recipe_label",
-    "Area over closing of the last fruit, {failed} rejected, with the recipe's limits",
-    "Area over closing of the last {n} fruit, {failed} of them rejected, with the recipe's limits",
+    "Area over closing of the last fruit, {failed} failed, with the recipe's limits",
+    "Area over closing of the last {n} fruit, {failed} of them failed, with the recipe's limits",
     "n",
 )
 define("chart.fruit_label", "Area over closing of fruit {n} with the limits of its recipe")

@@ -1,4 +1,4 @@
-"""Typed limits tried on past fruit: what they would reject, and both errors against people's marks."""
+"""Typed limits tried on past fruit: what they would divert, and both errors against people's marks."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ from station.whatif.replay import recipe_of_snapshot, replay
 from station.whatif.stored import read_stored, sequences, snapshots
 
 _LAST = 60
-"""Fruit whose rejects are counted, as many as the chart draws."""
+"""Fruit of which the diverted are counted, as many as the chart draws."""
 _MARKED = 200
 """The latest marked ones, of any recipe: with some milliseconds each, the answer comes while a person still looks."""
 
@@ -40,9 +40,9 @@ class Tried:
     """Latest judged fruit."""
     decided: int
     """Those of them whose result by the draft is known."""
-    rejected_before: int
+    diverted_before: int
     """Of those decided."""
-    rejected_after: int
+    diverted_after: int
     against: Compared | None
     """Comparison with people's marks; None if no fruit is marked."""
 

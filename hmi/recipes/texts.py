@@ -44,10 +44,10 @@ define("recipes.whatif", "What would it have decided?")
 define("recipes.whatif_last", "Last fruit")
 define("recipes.slide", "{field}: slider")
 define(
-    "recipes.tried_rejects",
-    "Of the last {n} fruit {decided} can be known: {after} rejected by these values, {before} before.",
+    "recipes.tried_diverted",
+    "Of the last {n} fruit {decided} can be known: {after} diverted by these values, {before} before.",
 )
-define("recipes.tried_good", "Marked good and rejected: {after} of {n}, {before} before")
+define("recipes.tried_good", "Marked good and diverted: {after} of {n}, {before} before")
 define("recipes.tried_bad", "Marked bad and passed: {after} of {n}, {before} before")
 define("recipes.tried_right", "Now right:")
 define("recipes.tried_wrong", "Now wrong:")

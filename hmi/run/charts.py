@@ -1,4 +1,4 @@
-"""Charts of the run page, without colour: the last fruit's curve, the trend of rejects, the cycle time's share."""
+"""Charts of the run page, without colour: the last fruit's curve, diverted fruit over time, the cycle time's share."""
 
 from collections.abc import Sequence
 
@@ -25,7 +25,7 @@ def curve(fruit: Fruit, locale: Locale) -> Markup:
 
 
 def trend(fruit: Sequence[FruitSummary], locale: Locale) -> Markup:
-    """Draw the rejects among ten fruit, ten after ten, the newest at the right: failed below, not judged above."""
+    """Draw the diverted among ten fruit, ten after ten, the newest at the right: failed below, not judged above."""
     buckets = [fruit[at : at + TREND_BUCKET] for at in range(0, len(fruit) - TREND_BUCKET + 1, TREND_BUCKET)][::-1]
     width, height, left, low = 340, 86, 54, 62
     parts = []
@@ -43,8 +43,8 @@ def trend(fruit: Sequence[FruitSummary], locale: Locale) -> Markup:
         parts.append(_bar("bar-unjudged", at, top, wide, unjudged * _TREND_HIGH))
     note = locale.text("run.trend_axis", n=TREND_BUCKET)
     parts.append(f'<text x="{width}" y="{height - 6}" text-anchor="end">{escape(note)}</text>')
-    rejected = [sum(each.outcome != "PASS" for each in bucket) for bucket in buckets]
-    label = locale.text("run.trend_label", figures=", ".join(map(str, rejected)) or "–")  # noqa: RUF001 (a dash)
+    diverted = [sum(each.outcome != "PASS" for each in bucket) for bucket in buckets]
+    label = locale.text("run.trend_label", figures=", ".join(map(str, diverted)) or "–")  # noqa: RUF001 (a dash)
     return Markup(  # noqa: S704 (numbers, our own classes, and escaped texts)
         f'<svg class="chart" viewBox="0 0 {width} {height}" role="img" font-size="13" aria-label="{escape(label)}">'
         f"{''.join(parts)}</svg>"

@@ -95,7 +95,7 @@ def _figures_values(gateway: Gateway, locale: Locale) -> Mapping[str, Any]:
         "state": gateway.state,
         "last": gateway.last,
         "looked_at": len(fruit),
-        "rejected": sum(each.outcome != "PASS" for each in fruit) / len(fruit) if fruit else None,
+        "diverted": sum(each.outcome != "PASS" for each in fruit) / len(fruit) if fruit else None,
         "reasons": reasons.most_common(_MOST_REASONS),
         "trend": charts.trend(fruit, locale),
         "bar": charts.bar,

@@ -115,8 +115,8 @@ def _of(lots: tuple[str, ...]) -> str:
 
 def _say(told: Counted, against: Compared | None, out: Path) -> None:
     click.echo(f"{told.total} inspections, {told.decided} decided by the draft")
-    click.echo(f"rejects: {told.rejects_before()} before, {told.rejects_after()} after")
-    click.echo(f"{told.newly_rejected} newly rejected, {told.newly_passed} newly passed")
+    click.echo(f"diverted: {told.rejects_before()} before, {told.rejects_after()} after")
+    click.echo(f"{told.newly_rejected} newly diverted, {told.newly_passed} newly passed")
     for line in [] if against is None else against.lines():
         click.echo(line)
     if told.measured_again:

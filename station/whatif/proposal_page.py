@@ -78,7 +78,7 @@ def lines_of(figures: dict[str, Any]) -> list[str]:
     for name, rate in figures["by_the_proposed_recipe"].items():
         low, high = ("not known" if end is None else f"{100 * end:.1f} %" for end in rate["interval"])
         lines.append(
-            f"{name} fruit rejected by the proposed recipe: {rate['rejected']} of {rate['decided']} decided "
+            f"{name} fruit diverted by the proposed recipe: {rate['rejected']} of {rate['decided']} decided "
             f"({rate['marked']} marked), 95 % interval {low} to {high}"
         )
     return lines

@@ -110,7 +110,7 @@ def test_recipes_their_history_and_past_curves_are_there_while_the_station_is_aw
         assert (status, b"Revision 1 in force" in body) == (200, True)
         status, _, body = pages("GET", "/recipes/strawberry")
         assert (status, b"No difference from the recipe in force" in body) == (200, True)
-        assert b"1 rejected" in body, "the fruit's curve is drawn"
+        assert b"1 failed" in body, "the fruit's curve is drawn"
         status, _, body = pages("GET", "/recipes/strawberry/history")
         assert (status, b"Shipped by" in body) == (200, True)
         status, _, body = pages("GET", "/recipes/strawberry/text?revision=1")

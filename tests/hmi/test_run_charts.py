@@ -1,4 +1,4 @@
-"""The run page's charts: every point and limit of the curve, and the trend of rejects."""
+"""The run page's charts: every point and limit of the curve, and the trend of diverted fruit."""
 
 import re
 import xml.etree.ElementTree as ET

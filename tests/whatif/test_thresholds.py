@@ -420,7 +420,7 @@ def test_a_limit_at_another_closing_has_the_least_area_of_there(orchard, station
     proposed = tmp_path / "proposed.yaml"
     code, told = station("thresholds", "--recipe", "raspberry", "--out", tmp_path / "out", "--draft", proposed)
     assert (code, "mm² at 1.5 mm" in told) == (0, True), told
-    assert "good fruit rejected by the proposed recipe: 0 of 20" in told
+    assert "good fruit diverted by the proposed recipe: 0 of 20" in told
     (area,) = load_recipe(proposed).damage.area
     assert (area.closing_mm, area.least_area_mm2) == (1.5, 15.5)
     assert 23 < area.area_mm2 < 38

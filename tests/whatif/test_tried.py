@@ -11,7 +11,7 @@ def test_a_moved_limit_is_tried_on_the_last_fruit_and_against_the_marks(orchard,
     made = orchard.store([orchard.press(growth, seed=number) for number, growth in enumerate(growths)])
     before = read_tried(orchard.folder, orchard.recipe)
     assert before is not None
-    assert (before.last, before.decided, before.rejected_before, before.rejected_after) == (11, 11, 4, 4)
+    assert (before.last, before.decided, before.diverted_before, before.diverted_after) == (11, 11, 4, 4)
     assert (before.against, before.errors) == (None, ()), "nothing is marked"
     assert station("records", "mark", *made[:7], "good")[0] == 0
     assert station("records", "mark", *made[7:], "bad")[0] == 0
@@ -19,7 +19,7 @@ def test_a_moved_limit_is_tried_on_the_last_fruit_and_against_the_marks(orchard,
     lower = changed(orchard.recipe, damage__area__0__area_mm2=60.0, damage__area__0__least_area_mm2=20.0)
     tried = read_tried(orchard.folder, lower)
     assert tried is not None
-    assert (tried.decided, tried.rejected_before, tried.rejected_after) == (11, 4, 11)
+    assert (tried.decided, tried.diverted_before, tried.diverted_after) == (11, 4, 11)
     good, bad = tried.errors
     assert (good.name, good.of, good.before, good.after) == ("good", 7, 1, 7)
     assert (bad.name, bad.of, bad.before, bad.after) == ("bad", 4, 1, 0)

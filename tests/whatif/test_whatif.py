@@ -171,7 +171,7 @@ def test_the_command_shows_which_fruit_change_sides_and_goes_on_where_it_was(orc
     (row,) = [row for row in csv.DictReader((out / "changes.csv").read_text().splitlines()) if row["changes_side"]]
     assert (row["sequence"], row["lot"], row["before"], row["changes_side"]) == ("3", "A", "PASS", "rejected")
     page = (out / "whatif.html").read_text()
-    assert "1 newly rejected, 0 newly passed" in page
+    assert "1 newly diverted, 0 newly passed" in page
     assert "damage.area[0].area_mm2: 112.0 → 90.0" in page
     assert "http" not in page.replace("http://www.w3.org", ""), "it needs no network"
     lines = (out / "replayed.jsonl").read_text()

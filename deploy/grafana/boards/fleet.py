@@ -23,10 +23,13 @@ COMPARED = (
          (f"sum by (station) (station_priority:alarms_active:sum{{{HERE}}})", "{{station}}")),
     prom("lines", "Throughput", "short", "Fruit a minute.", "cycle-time.md",
          (f"60 * station:inspections:rate15m{{{HERE}}}", "{{station}}")),
-    prom("lines", "Reject rate", "percentunit", "Over one hour. One station that differs from the others on the same "
+    prom("lines", "Reject rate", "percentunit",
+         "Share of the judged fruit that failed, over one hour. One station that differs from the others on the same "
          "fruit measures differently: verify it.", "alarms.md#reject-rate",
          (f"station_fruit:reject_ratio:1h{{{HERE}}}", "{{station}}, {{fruit}}")),
-    prom("lines", "Not judged", "percentunit", "Over one hour.", "alarms.md#many-no-result",
+    prom("lines", "Not judged", "percentunit",
+         "Share of all fruit without a result, over one hour, for reasons that no alert of the sensor names.",
+         "alarms.md#many-no-result",
          (f"station_fruit:unjudged_ratio:1h{{{HERE}}}", "{{station}}, {{fruit}}")),
     prom("lines", "Share of the deadline", "percentunit", "Of the slowest twentieth.", "alarms.md#deadline-missed",
          (f"station_fruit:cycle_share:p95_15m{{{HERE}}}", "{{station}}, {{fruit}}")),

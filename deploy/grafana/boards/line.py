@@ -10,7 +10,7 @@ REJECTS, UNJUDGED, LATE = "alarms.md#reject-rate", "alarms.md#many-no-result", "
 
 NOW = (
     prom(
-        "number", "Rejected, last hour", "percentunit",
+        "number", "Reject rate, last hour", "percentunit",
         "Share of the judged fruit that failed. The alert RejectRateHigh reports an unusual share.",
         REJECTS, (f"station_fruit:reject_ratio:1h{{{HERE}}}", "{{fruit}}"), width=6,
     ),
@@ -34,8 +34,8 @@ NOW = (
 RATES = (
     prom(
         "lines", "Reject rate and its band", "percentunit",
-        "Failed of judged, over one hour, with the last seven days and what chance allows on top of them. Above the "
-        "band look at rejected fruit: the lot is bad, or the measurement is.",
+        "Share of the judged fruit that failed, over one hour, with the last seven days and what chance allows on top "
+        "of them. Above the band look at rejected fruit: the lot is bad, or the measurement is.",
         REJECTS,
         (f"station_fruit:reject_ratio:1h{{{HERE}}}", "{{fruit}}"),
         (f"station_fruit:reject_ratio:7d{{{HERE}}}", "{{fruit}}, seven days"),
@@ -63,7 +63,8 @@ RATES = (
     ),
     prom(
         "lines", "Not judged and its band", "percentunit",
-        "Without a result, over one hour, with the last seven days and what chance allows on top of them.",
+        "Share of all fruit without a result, over one hour, with the last seven days and what chance allows on top "
+        "of them.",
         UNJUDGED,
         (f"station_fruit:unjudged_ratio:1h{{{HERE}}}", "{{fruit}}"),
         (f"station_fruit:unjudged_ratio:7d{{{HERE}}}", "{{fruit}}, seven days"),
@@ -71,7 +72,7 @@ RATES = (
     ),
     prom(
         "lines", "Reject rate, today against last week", "percentunit",
-        "The same hour of the same weekday, one week ago.",
+        "Share of the judged fruit that failed; beside it the same hour of the same weekday, one week ago.",
         REJECTS,
         (f"station_fruit:reject_ratio:1h{{{HERE}}}", "{{fruit}}"),
         (f"station_fruit:reject_ratio:1h{{{HERE}}} offset 1w", "{{fruit}}, last week"),

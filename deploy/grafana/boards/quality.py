@@ -44,7 +44,8 @@ def median(quantity: str, metric: str, unit: float, name: str) -> str:
 LOTS = (
     sql("table", "Lots", "percentunit",
         "Each lot of the range, whole: also its fruit before and after the range; the newest on top. Fruit without a "
-        "lot is counted in the range. The lot's report is at the station: `station records report NAME lot.html`.",
+        "lot is counted in the range. *Failed* is a share of the judged fruit, *not judged* of all fruit. The lot's "
+        "report is at the station: `station records report NAME lot.html`.",
         "records.md",
         f"""SELECT {LOT} AS lot, {GROWER} AS grower, fruit, station, min(first_began) AS began,
         {ALL}::text AS inspected, {FAILED} AS failed, {UNJUDGED} AS "not judged"
@@ -53,7 +54,8 @@ LOTS = (
         GROUP BY 1, 2, fruit, station ORDER BY min(first_began) DESC LIMIT 200""", width=24),
 )  # fmt: skip
 GROWERS = (
-    sql("table", "Growers", "percentunit", "Who brings what, worst first.", "records.md",
+    sql("table", "Growers", "percentunit",
+        "Who brings what, worst first. *Failed* is a share of the judged fruit.", "records.md",
         f"""SELECT {GROWER} AS grower, fruit, {ALL}::text AS inspected, {FAILED} AS failed
         FROM hourly_outcomes_of_growers WHERE {HERE}
         GROUP BY 1, fruit ORDER BY 4 DESC NULLS LAST""", width=12),
