@@ -43,6 +43,7 @@ class Manifest(BaseModel):
     sequence: int = Field(ge=0, le=LARGEST)
     """The highest sequence number given when the backup was made."""
     inspections: int = Field(ge=0)
+    """With an outcome: a restore leaves out one that ran."""
     images: int = Field(ge=0)
     size_bytes: int = Field(ge=0)
     database_sha256: str = Field(pattern="^[0-9a-f]{64}$")
@@ -195,7 +196,7 @@ def _copied(folder: Path, partial: Path) -> Manifest:
     size_bytes, missing, notes = _copy_images(folder, partial)
     head, cut = _audit_head(folder, path, known)
     with closing(sqlite3.connect(path)) as target:
-        inspections, last = target.execute("SELECT count(*), max(sequence) FROM inspections").fetchone()
+        inspections, last = target.execute("SELECT count(outcome), max(sequence) FROM inspections").fetchone()
         (referred_to,) = target.execute("SELECT count(DISTINCT sha256) FROM images").fetchone()
     _sync(path)
     return Manifest(

@@ -8,7 +8,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
-from sqlalchemy import func, insert, select
+from sqlalchemy import delete, func, insert, select
 
 from station.atomic_file import sync_folder
 from station.messages import records as messages
@@ -22,7 +22,7 @@ from station.records.high_water_mark import MARK_NAME, HighWaterMark
 from station.records.images import FOLDER_NAME, image_path
 from station.records.open import BELONGING, RESTORING, lock_folder
 from station.records.retention import forget_missing, referred
-from station.records.schema import origins, outbox
+from station.records.schema import inspections, origins, outbox
 from station.records.schema_check import check_schema
 from station.records.signing import PublicKeys
 
@@ -134,6 +134,9 @@ def _continue(folder: Path, new: Path, manifest: Manifest, by: str) -> Head | No
             connection.execute(insert(origins).values(first_entry=after, id=uuid.uuid4().hex).prefix_with("OR REPLACE"))
             told = {"made_utc_ms": manifest.made_utc_ms, "inspections": manifest.inspections}
             append_restored(connection, by, read_head(folder), told)
+            # What ran when the backup was made has ended since: its outcome is not in the backup, and a start would
+            # give it another one. The next inspection's row of skipped numbers names it.
+            connection.execute(delete(inspections).where(inspections.c.outcome.is_(None)))
             if manifest.missing:
                 forget_missing(connection, frozenset(manifest.missing))
             head = newer_head(connection, None)

@@ -10,11 +10,13 @@ from dataclasses import replace
 import pytest
 
 from station.messages import records as messages
+from station.records.audit_report import read_audit
 from station.records.backup import MANIFEST_NAME, make_backup
-from station.records.database import FILE_NAME
+from station.records.database import FILE_NAME, reading
 from station.records.errors import DamagedError, DiskFullError, LockedError, RecordsError
 from station.records.holds import hold, release
 from station.records.integrity_check import check_records
+from station.records.model import OpenInspections
 from station.records.restore import restore_backup
 from station.records.signing import public_keys_of
 from tests.records.causes import because
@@ -105,6 +107,37 @@ def test_a_backup_while_the_station_writes_is_whole_and_can_be_put_back(
             )
 
     scenario(goes_on)
+
+
+def test_a_fruit_that_ran_while_the_backup_was_made_has_no_invented_outcome_after_its_restore(
+    opened, scenario, inspected, noise, folder, tmp_path, ask, trigger, passed
+):
+    async def before():
+        async with opened() as records:
+            await inspected(records, 1, noise())
+            running = await records.begin(trigger)
+            made = await asyncio.to_thread(make_backup, folder, tmp_path / "copy")
+            assert (made.inspections, made.sequence) == (1, running)
+            await records.published(await records.conclude(running, passed))
+            await records.acknowledged(running)
+
+    async def after():
+        async with opened() as records:
+            assert records.lost == ()
+            assert [outcome.sequence for outcome in (await records.open_inspections()).ended] == [1]
+            await records.acknowledged(2)
+            assert await records.open_inspections() == OpenInspections((), ())
+            await inspected(records, 1, noise())
+            assert (await records.inspection(3)).standing is not None
+
+    scenario(before)
+    restore_backup(folder, tmp_path / "copy", "ada", public_keys_of(folder))
+    assert check_records(folder).faults == ()
+    scenario(after)
+    assert check_records(folder).faults == ()
+    with reading(folder) as connection:
+        (skipped,) = read_audit(connection, 9, "numbers.skipped")
+    assert skipped.subject == "2"
 
 
 @pytest.mark.parametrize("spoiled", [FILE_NAME, "image", MANIFEST_NAME])
