@@ -43,7 +43,7 @@ def lot() -> None:
 @by_option
 @config_option
 def lot_start(name: str, grower: str, *, correct: bool, by: str, config: Path | None) -> None:
-    """Register that the lot NAME starts. Repeating it changes nothing."""
+    """Register that the lot NAME starts, or runs again after its end. Repeating it changes nothing."""
     with short_transaction(folder_of(config)) as connection:
         known = {row.name: row for row in read_lots(connection, 1, name=name)}.get(name)
         started = start_lot(connection, name, grower, correct=correct)

@@ -14,10 +14,10 @@ LONGEST_NAME = 32
 
 
 def start_lot(connection: Connection, name: str, grower: str, *, correct: bool = False) -> LotView:
-    """Register a lot's start, by the name that the PLC gives with each trigger. Idempotent.
+    """Register a lot's start, by the name that the PLC gives with each trigger. Idempotent; one that ended runs again.
 
     Args:
-        correct: replace the grower registered before.
+        correct: replace the grower registered before; one that ended remains so.
 
     Raises:
         RecordsError: the name or grower is invalid, or the lot is another grower's.
@@ -30,12 +30,16 @@ def start_lot(connection: Connection, name: str, grower: str, *, correct: bool =
     known = _known(connection, name)
     if known is None:
         connection.execute(insert(lots).values(name=name, grower=grower, began_utc_ms=utc_ms(), revision=1))
-    elif known.grower == grower:
-        return known
-    elif not correct:
-        raise RecordsError(messages.ANOTHER_GROWER(lot=name, known=known.grower, grower=grower), messages.CORRECT_LOT())
-    else:
+    elif known.grower != grower:
+        if not correct:
+            raise RecordsError(
+                messages.ANOTHER_GROWER(lot=name, known=known.grower, grower=grower), messages.CORRECT_LOT()
+            )
         _change(connection, known, grower=grower)
+    elif known.ended_utc_ms is None or correct:
+        return known
+    else:
+        _change(connection, known, ended_utc_ms=None)
     return _changed(connection, name)
 
 

@@ -184,3 +184,23 @@ def test_the_command_finds_by_what_was_told_of_lots(opened, scenario, folder, as
         trail = connection.exec_driver_sql(query).all()
     assert [row.action for row in trail] == ["lot.started", "lot.started", "lot.ended"]
     assert trail[1][:3] == ("ada", "lot.started", '{"grower":"Meier"}')
+
+
+def test_a_lot_that_is_started_again_runs_until_it_is_ended_again(opened, scenario, folder):
+    async def steps():
+        async with opened():
+            pass
+
+    scenario(steps)
+    with short_transaction(folder) as connection:
+        began = start_lot(connection, "west", "Meier")
+        assert start_lot(connection, "west", "Meier") == began, "it runs"
+        first = end_lot(connection, "west")
+        assert start_lot(connection, "west", "Meier", correct=True) == first, "a correction starts nothing"
+        again = start_lot(connection, "west", "Meier")
+        assert (again.began_utc_ms, again.ended_utc_ms) == (began.began_utc_ms, None)
+        second = end_lot(connection, "west")
+        assert first.ended_utc_ms is not None
+        assert second.ended_utc_ms is not None
+        assert second.ended_utc_ms >= first.ended_utc_ms
+        assert [each.revision for each in (began, first, again, second)] == [1, 2, 3, 4]

@@ -1,10 +1,11 @@
 """Operator commands from the panel: started at once, followed to their end, shown on all panels, and audited."""
 
 import asyncio
-import contextlib
 import itertools
 import logging
 from collections import deque
+
+from sqlalchemy import Connection
 
 from station.channel.line import Command, CommandName
 from station.channel.panel import Recover, RecoveryName
@@ -19,7 +20,7 @@ from station.messages import lots
 from station.messages.message import Message, message_of
 from station.messages.operation import INTERNAL_FAULT
 from station.records.errors import RecordsError
-from station.records.lots import end_lot, start_lot
+from station.records.lots import end_lot, read_lots, start_lot
 from station.records.records import Records
 from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import ARM, DeviceManager
@@ -181,11 +182,19 @@ class OperatorCommands:
             return lots.PLC_NAMES()
         if not is_lot_name(name):
             return lots.BAD_NAME(name=name, longest=LONGEST_LOT)
-        if grower:
-            try:
-                await self._records.change(lambda connection: start_lot(connection, name, grower))
-            except RecordsError as error:
-                return message_of(error)
+        before = self._lots.named
+
+        def register(connection: Connection) -> None:
+            if before != name:
+                _end_registered(connection, before)
+            known = grower or next((lot.grower for lot in read_lots(connection, 1, name=name)), "")
+            if known:
+                start_lot(connection, name, known)
+
+        try:
+            await self._records.change(register)
+        except RecordsError as error:
+            return message_of(error)
         return None if await self._lots.set_lot(name) else lots.START_NOT_STORED(lot=name)
 
     async def _end_lot(self, name: str) -> Message | None:
@@ -193,11 +202,19 @@ class OperatorCommands:
             return lots.NONE()
         if name != self._lots.named:
             return lots.ANOTHER(lot=name, now=self._lots.named)
-        with contextlib.suppress(RecordsError):  # a lot without a grower was never registered
-            await self._records.change(lambda connection: end_lot(connection, name))
+        try:
+            await self._records.change(lambda connection: _end_registered(connection, name))
+        except RecordsError as error:
+            return message_of(error)
         if name != self._lots.named:  # another one was started meanwhile
             return None
         return None if await self._lots.set_lot("") else lots.END_NOT_STORED(lot=name)
+
+
+def _end_registered(connection: Connection, name: str) -> None:
+    """End a lot in the records, unless it is not in them: one without a grower was never registered."""
+    if read_lots(connection, 1, name=name):
+        end_lot(connection, name)
 
 
 def _under_way(entry: OperatorCommandView, request: OperatorCommand) -> bool:

@@ -21,6 +21,8 @@ from station.channel.panel_live import (
 )
 from station.inspection.states import State
 from station.messages import lots, readiness, recipes
+from station.messages import records as records_messages
+from station.messages.message import message_of
 from station.recipe_store.editor import RecipeEditor
 from station.recipe_store.history import Person
 from station.recipe_store.store import RecipeStore
@@ -28,6 +30,8 @@ from station.records.audit_check import check_audit
 from station.records.audit_head import read_head
 from station.records.audit_report import read_audit
 from station.records.database import reading, records_folder
+from station.records.errors import DiskFullError
+from station.records.lots import read_lots
 from station.runtime.production import operator_commands
 from station.runtime.production.lots import LotManager
 from station.settings.hmi import panel_endpoint
@@ -229,27 +233,67 @@ async def begin(cell, trigger_id, lot, deadline_s=20.0):
 
 
 def test_the_end_of_a_lot_leaves_one_that_was_started_while_the_disk_was_slow(bench, monkeypatch):
-    ending, may_end = threading.Event(), threading.Event()
-    end_lot = operator_commands.end_lot
+    starting, may_start = threading.Event(), threading.Event()
+    start_lot = operator_commands.start_lot
 
     def slow(*of):
-        ending.set()
-        assert may_end.wait(60)
-        return end_lot(*of)
+        starting.set()
+        assert may_start.wait(60)
+        return start_lot(*of)
 
-    monkeypatch.setattr(operator_commands, "end_lot", slow)
+    monkeypatch.setattr(operator_commands, "start_lot", slow)
 
     async def scenario():
         async with bench() as cell:
             assert (await give(cell, OperatorCommandName.START_LOT, "A")).state == "done"
-            given = asyncio.create_task(give(cell, OperatorCommandName.END_LOT, "A"))
-            assert await asyncio.to_thread(ending.wait, 60)
-            assert (await give(cell, OperatorCommandName.START_LOT, "B")).state == "done"
-            may_end.set()
-            assert (await given).state == "done"
+            started = asyncio.create_task(give(cell, OperatorCommandName.START_LOT, "B", "Meier"))
+            assert await asyncio.to_thread(starting.wait, 60)
+            ended = asyncio.create_task(give(cell, OperatorCommandName.END_LOT, "A"))
+            async with asyncio.timeout(60):
+                while not [each for each in (await panel_state(cell)).orders if each.order == "end_lot"]:
+                    await asyncio.sleep(0.02)
+            may_start.set()
+            assert [(await each).state for each in (started, ended)] == ["done", "done"]
             return (await panel_state(cell)).named_lot
 
     assert asyncio.run(scenario()) == "B"
+
+
+def test_a_lot_in_place_of_which_another_is_started_has_ended_and_runs_when_it_is_started_again(bench):
+    async def scenario():
+        async with bench() as cell:
+            records = cell.station.service.registry.records
+
+            async def running():
+                return {lot.name for lot in await records.change(lambda it: read_lots(it, 9)) if not lot.ended_utc_ms}
+
+            assert (await give(cell, OperatorCommandName.START_LOT, "A", "Meier")).state == "done"
+            assert (await give(cell, OperatorCommandName.START_LOT, "B", "Huber")).state == "done"
+            assert await running() == {"B"}
+            assert (await give(cell, OperatorCommandName.START_LOT, "A")).state == "done", "its grower is known"
+            assert await running() == {"A"}
+            assert (await give(cell, OperatorCommandName.END_LOT, "A")).state == "done"
+            assert await running() == set()
+
+    asyncio.run(scenario())
+
+
+def test_a_lot_whose_end_the_records_refuse_is_not_ended(bench, monkeypatch):
+    full = DiskFullError(records_messages.DISK_FULL(place="records", words="ENOSPC"), records_messages.FREE_SPACE())
+
+    def refuse(*_):
+        raise full
+
+    async def scenario():
+        async with bench() as cell:
+            assert (await give(cell, OperatorCommandName.START_LOT, "A", "Meier")).state == "done"
+            monkeypatch.setattr(operator_commands, "end_lot", refuse)
+            for order, lot in ((OperatorCommandName.END_LOT, "A"), (OperatorCommandName.START_LOT, "B")):
+                refused = await give(cell, order, lot)
+                assert (refused.state, refused.why) == ("failed", message_of(full))
+            assert (await panel_state(cell)).named_lot == "A"
+
+    asyncio.run(scenario())
 
 
 @pytest.mark.timeout(240)
@@ -382,9 +426,9 @@ async def panel_state(cell):
     return await at_panel(cell, GetPanelState(), PanelState)
 
 
-async def give(cell, order, lot):
+async def give(cell, order, lot, grower=""):
     """Give an order at the panel, and return it once it has ended."""
-    request = OperatorCommand(person=Actor(who="Ida", role="operator"), order=order, argument=lot)
+    request = OperatorCommand(person=Actor(who="Ida", role="operator"), order=order, argument=lot, grower=grower)
     given = await at_panel(cell, request, OperatorCommandView)
     async with asyncio.timeout(60):
         while given.state == "executing":
