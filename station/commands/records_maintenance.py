@@ -45,12 +45,7 @@ def lot() -> None:
 def lot_start(name: str, grower: str, *, correct: bool, by: str, config: Path | None) -> None:
     """Register that the lot NAME starts, or runs again after its end. Repeating it changes nothing."""
     with short_transaction(folder_of(config)) as connection:
-        known = {row.name: row for row in read_lots(connection, 1, name=name)}.get(name)
-        started = start_lot(connection, name, grower, correct=correct)
-        if started != known:
-            old = None if known is None else {"grower": known.grower}
-            entry = AuditEntry(by, _ROLE, "lot.started", f"lot {name}", old=old, new={"grower": grower})
-            append_audit(connection, entry)
+        started = start_lot(connection, name, grower, (by, _ROLE), correct=correct)
     click.echo(_lot_line(started))
 
 
@@ -61,10 +56,7 @@ def lot_start(name: str, grower: str, *, correct: bool, by: str, config: Path | 
 def lot_end(name: str, by: str, config: Path | None) -> None:
     """Register that the lot NAME has ended. Repeating it changes nothing."""
     with short_transaction(folder_of(config)) as connection:
-        running = any(row.ended_utc_ms is None for row in read_lots(connection, 1, name=name))
-        ended = end_lot(connection, name)
-        if running:
-            append_audit(connection, AuditEntry(by, _ROLE, "lot.ended", f"lot {name}"))
+        ended = end_lot(connection, name, (by, _ROLE))
     click.echo(_lot_line(ended))
 
 

@@ -1,10 +1,11 @@
-"""Lots as people or the packhouse's system register them: grower, start and end."""
+"""Lots as people or the packhouse's system register them: grower, start and end, each change with its audit entry."""
 
 from sqlalchemy import Connection, insert, select, update
 
 from station.channel.panel_queries import LotView
 from station.clock import utc_ms
 from station.messages import records as messages
+from station.records.audit import AuditEntry, append_audit
 from station.records.errors import RecordsError
 from station.records.schema import lots
 from station.records.write_requests import queue_event
@@ -13,10 +14,11 @@ LONGEST_NAME = 32
 """As the PLC gives it: `station.channel.line.Begin.lot`."""
 
 
-def start_lot(connection: Connection, name: str, grower: str, *, correct: bool = False) -> LotView:
+def start_lot(connection: Connection, name: str, grower: str, by: tuple[str, str], *, correct: bool = False) -> LotView:
     """Register a lot's start, by the name that the PLC gives with each trigger. Idempotent; one that ended runs again.
 
     Args:
+        by: name and role of who registers it, for the audit trail.
         correct: replace the grower registered before; one that ended remains so.
 
     Raises:
@@ -40,11 +42,16 @@ def start_lot(connection: Connection, name: str, grower: str, *, correct: bool =
         return known
     else:
         _change(connection, known, ended_utc_ms=None)
+    old = None if known is None else {"grower": known.grower}
+    append_audit(connection, AuditEntry(*by, "lot.told", f"lot {name}", old=old, new={"grower": grower}))
     return _changed(connection, name)
 
 
-def end_lot(connection: Connection, name: str) -> LotView:
+def end_lot(connection: Connection, name: str, by: tuple[str, str]) -> LotView:
     """Register a lot's end. Idempotent.
+
+    Args:
+        by: name and role of who registers it, for the audit trail.
 
     Raises:
         RecordsError: its start was not registered.
@@ -55,6 +62,7 @@ def end_lot(connection: Connection, name: str) -> LotView:
     if known.ended_utc_ms is not None:
         return known
     _change(connection, known, ended_utc_ms=utc_ms())
+    append_audit(connection, AuditEntry(*by, "lot.ended", f"lot {name}"))
     return _changed(connection, name)
 
 

@@ -323,7 +323,7 @@ class Records:
         return await self.change_to_end(lambda connection: tuple(append_audit(connection, entry) for entry in entries))
 
     async def change(self, work: Work[T]) -> T:
-        """Change lots or holds in the writer's thread, as `lambda connection: start_lot(connection, name, grower)`.
+        """Change lots or holds in the writer's thread, as `lambda connection: end_lot(connection, name, by)`.
 
         Raises:
             RecordsError: it may not be durable.

@@ -38,8 +38,7 @@ def fruit(tmp_path: Path) -> int:
                 "FAIL", ("area_over_limit",), (), False, False, 170.0, 44_500, 4.0, 0.9, 1_700_000_003_210, 3210
             )
             await records.conclude(sequence, judged)
-            await records.change(lambda connection: start_lot(connection, "A-17", "Meadow Farm"))
-            await records.audit(AuditEntry("Ida", "operator", "lot.told", "lot A-17", new={"grower": "Meadow Farm"}))
+            await records.change(lambda connection: start_lot(connection, "A-17", "Meadow Farm", ("Ida", "operator")))
             return sequence
         finally:
             await records.close()

@@ -14,6 +14,7 @@ from station.records.retention import remove_oldest_images
 from station.records.short_transaction import short_transaction
 
 DAY_MS = 86_400_000
+IDA = ("Ida", "operator")
 
 
 def now_ms():
@@ -49,9 +50,9 @@ def test_an_old_inspection_that_changed_now_has_waited_since_now(old):
 
 def test_a_lot_has_waited_since_its_last_change(old):
     with short_transaction(old) as connection:
-        start_lot(connection, "A-17", "Meier")
+        start_lot(connection, "A-17", "Meier", IDA)
         connection.exec_driver_sql("UPDATE lots SET began_utc_ms = ? WHERE name = 'A-17'", (now_ms() - DAY_MS,))
-        end_lot(connection, "A-17")
+        end_lot(connection, "A-17", IDA)
     ended = read_batch(old, "s", 0).last
     assert age_s(old, ended - 1) < 60
 

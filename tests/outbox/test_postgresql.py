@@ -29,6 +29,7 @@ from station.records.write_requests import queue_event
 from station.settings.outbox import OutboxPostgresqlSettings
 
 LIMIT_S = 90.0
+IDA = ("Ida", "operator")
 
 
 def settings(server, **changes):
@@ -75,10 +76,10 @@ def test_an_inspection_a_lot_and_an_audit_row_arrive_as_they_are(server, fill, t
         connection.exec_driver_sql(
             "UPDATE inspections SET fruit_length_mm_x10 = 481, size_class = 3 WHERE sequence = 1"
         )
-        start_lot(connection, "A\N{LATIN SMALL LETTER U WITH DIAERESIS}", "Meier")
-        end_lot(connection, "A\N{LATIN SMALL LETTER U WITH DIAERESIS}")
+        start_lot(connection, "A\N{LATIN SMALL LETTER U WITH DIAERESIS}", "Meier", IDA)
+        end_lot(connection, "A\N{LATIN SMALL LETTER U WITH DIAERESIS}", IDA)
         append_audit(connection, AuditEntry("ada", "quality", "tried", "nothing", "to see", {"a": 1}, [2]))
-    assert asyncio.run(tell_all(server, tmp_path, "as-they-are")) == 5
+    assert asyncio.run(tell_all(server, tmp_path, "as-they-are")) == 3 + 1 + 3, "a lot's start and end are in the trail"
     query = "SELECT lot, outcome, reasons, area_mm2, fruit, jsonb_array_length(curve), began::text FROM inspections"
     first, *_ = rows(server, f"{query} WHERE station = 'as-they-are' ORDER BY sequence")
     assert first == ("L00000", "PASS", [], 21.0, "raspberry", 4, "2026-01-01 00:00:03+00")
@@ -88,9 +89,10 @@ def test_an_inspection_a_lot_and_an_audit_row_arrive_as_they_are(server, fill, t
     assert sizes[:2] == [(48.1, 3), (None, None)]
     ((grower, ended, revision),) = rows(server, "SELECT grower, ended, revision FROM lots WHERE name = 'Aü'")
     assert (grower, revision, ended is None) == ("Meier", 2, False)
-    ((who, old, new, digest),) = rows(server, "SELECT who, old, new, hash FROM audit WHERE station = 'as-they-are'")
+    query = "SELECT who, old, new, hash FROM audit WHERE station = 'as-they-are' AND action = 'tried'"
+    ((who, old, new, digest),) = rows(server, query)
     with sqlite3.connect(tmp_path / FILE_NAME) as database:
-        assert (digest,) == database.execute("SELECT hash FROM audit").fetchone()
+        assert (digest,) == database.execute("SELECT hash FROM audit ORDER BY seq DESC").fetchone()
     database.close()
     assert (who, old, new) == ("ada", '{"a":1}', "[2]")
     assert asyncio.run(tell_all(server, tmp_path, "as-they-are")) == 0, "the server knows how far it was told"

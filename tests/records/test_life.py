@@ -57,11 +57,11 @@ def test_numbers_go_on_over_restarts(opened, scenario, trigger):
 def test_a_request_that_fails_half_way_leaves_nothing_and_the_others_of_its_transaction_are_stored(opened, scenario):
     async def steps():
         def half(connection):
-            start_lot(connection, "half", "Hill Farm")
+            start_lot(connection, "half", "Hill Farm", ("Ida", "operator"))
             raise BadRecordError(messages.AUDIT_VALUE(value="x", words="no JSON"), messages.SEE_LOG())
 
         async with opened() as records:
-            changes = (half, lambda connection: start_lot(connection, "whole", "Hill Farm"), half)
+            changes = (half, lambda connection: start_lot(connection, "whole", "Hill Farm", ("Ida", "operator")), half)
             ended = await asyncio.gather(*map(records.change, changes), return_exceptions=True)
             assert [type(each) is BadRecordError for each in ended] == [True, False, True]
             lots = await records.change(lambda connection: read_lots(connection, 10))

@@ -21,6 +21,7 @@ from station.records.short_transaction import short_transaction
 from station.records.write_requests import conclude, insert_trigger, publish
 from tests.records.causes import because
 
+IDA = ("Ida", "operator")
 FRUIT = st.sampled_from(["strawberry", "strawberry, revised", "raspberry", None])
 GROWERS = {"A": "Meier", "B": "Meier", "C": "Huber"}
 LOTS = st.sampled_from(["A", "B", "C", "D", ""])
@@ -79,7 +80,7 @@ def test_what_is_found_is_what_there_is_also_where_the_clock_stepped(inspected, 
         migrate(engine, folder)
         with engine.begin() as connection:
             for lot, grower in GROWERS.items():
-                start_lot(connection, lot, grower)
+                start_lot(connection, lot, grower, IDA)
             for sequence, (lot, hour, end, fruit) in enumerate(inspected, start=1):
                 began = replace(trigger, lot=lot, recipe=snapshot(fruit), began_utc_ms=hour * HOUR_MS + sequence)
                 insert_trigger(connection, sequence, began, "boot")
@@ -178,12 +179,12 @@ def test_the_command_finds_by_what_was_told_of_lots(opened, scenario, folder, as
     assert ask("lot", "end", "west").output.startswith("west: Huber, began")
     with short_transaction(folder) as connection:
         (lot,) = read_lots(connection, 9)
-        assert end_lot(connection, "west") == lot, "a lot ends once"
+        assert end_lot(connection, "west", IDA) == lot, "a lot ends once"
         assert lot.revision == 3
         query = "SELECT who, action, old, new FROM audit WHERE action LIKE 'lot%' ORDER BY seq"
         trail = connection.exec_driver_sql(query).all()
-    assert [row.action for row in trail] == ["lot.started", "lot.started", "lot.ended"]
-    assert trail[1][:3] == ("ada", "lot.started", '{"grower":"Meier"}')
+    assert [row.action for row in trail] == ["lot.told", "lot.told", "lot.ended"]
+    assert trail[1][:3] == ("ada", "lot.told", '{"grower":"Meier"}')
 
 
 def test_a_lot_that_is_started_again_runs_until_it_is_ended_again(opened, scenario, folder):
@@ -193,13 +194,13 @@ def test_a_lot_that_is_started_again_runs_until_it_is_ended_again(opened, scenar
 
     scenario(steps)
     with short_transaction(folder) as connection:
-        began = start_lot(connection, "west", "Meier")
-        assert start_lot(connection, "west", "Meier") == began, "it runs"
-        first = end_lot(connection, "west")
-        assert start_lot(connection, "west", "Meier", correct=True) == first, "a correction starts nothing"
-        again = start_lot(connection, "west", "Meier")
+        began = start_lot(connection, "west", "Meier", IDA)
+        assert start_lot(connection, "west", "Meier", IDA) == began, "it runs"
+        first = end_lot(connection, "west", IDA)
+        assert start_lot(connection, "west", "Meier", IDA, correct=True) == first, "a correction starts nothing"
+        again = start_lot(connection, "west", "Meier", IDA)
         assert (again.began_utc_ms, again.ended_utc_ms) == (began.began_utc_ms, None)
-        second = end_lot(connection, "west")
+        second = end_lot(connection, "west", IDA)
         assert first.ended_utc_ms is not None
         assert second.ended_utc_ms is not None
         assert second.ended_utc_ms >= first.ended_utc_ms

@@ -165,9 +165,9 @@ class OperatorCommands:
             case OperatorCommandName.STOP:
                 why = await self._plc_commands.stop()
             case OperatorCommandName.START_LOT:
-                why = await self._start_lot(argument, request.grower)
+                why = await self._start_lot(argument, request.grower, by)
             case _:
-                why = await self._end_lot(argument)
+                why = await self._end_lot(argument, by)
         self._audit.log_command(by[0], order, argument, why, by[1])
         return why
 
@@ -177,7 +177,7 @@ class OperatorCommands:
                 return (await self._plc_commands.recover(Recover(what=standing), by)).why
         return messages.NOTHING_TO_RECOVER()
 
-    async def _start_lot(self, name: str, grower: str) -> Message | None:
+    async def _start_lot(self, name: str, grower: str, by: tuple[str, str]) -> Message | None:
         if self._lots.plc_names:
             return lots.PLC_NAMES()
         if not is_lot_name(name):
@@ -186,10 +186,10 @@ class OperatorCommands:
 
         def register(connection: Connection) -> None:
             if before != name:
-                _end_registered(connection, before)
+                _end_registered(connection, before, by)
             known = grower or next((lot.grower for lot in read_lots(connection, 1, name=name)), "")
             if known:
-                start_lot(connection, name, known)
+                start_lot(connection, name, known, by)
 
         try:
             await self._records.change(register)
@@ -197,13 +197,13 @@ class OperatorCommands:
             return message_of(error)
         return None if await self._lots.set_lot(name) else lots.START_NOT_STORED(lot=name)
 
-    async def _end_lot(self, name: str) -> Message | None:
+    async def _end_lot(self, name: str, by: tuple[str, str]) -> Message | None:
         if not self._lots.named:
             return lots.NONE()
         if name != self._lots.named:
             return lots.ANOTHER(lot=name, now=self._lots.named)
         try:
-            await self._records.change(lambda connection: _end_registered(connection, name))
+            await self._records.change(lambda connection: _end_registered(connection, name, by))
         except RecordsError as error:
             return message_of(error)
         if name != self._lots.named:  # another one was started meanwhile
@@ -211,10 +211,10 @@ class OperatorCommands:
         return None if await self._lots.set_lot("") else lots.END_NOT_STORED(lot=name)
 
 
-def _end_registered(connection: Connection, name: str) -> None:
+def _end_registered(connection: Connection, name: str, by: tuple[str, str]) -> None:
     """End a lot in the records, unless it is not in them: one without a grower was never registered."""
     if read_lots(connection, 1, name=name):
-        end_lot(connection, name)
+        end_lot(connection, name, by)
 
 
 def _under_way(entry: OperatorCommandView, request: OperatorCommand) -> bool:

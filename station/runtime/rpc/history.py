@@ -21,21 +21,17 @@ class PanelHistory:
 
     async def start_lot(self, request: StartLot) -> LotView:
         """Store a lot's start with its audit entry."""
-        lot = await self._records.change(lambda connection: start_lot(connection, request.name, request.grower))
-        await self._note(request, "lot.told", {"grower": lot.grower})
-        return lot
+        by = request.actor.who, request.actor.role
+        return await self._records.change(lambda connection: start_lot(connection, request.name, request.grower, by))
 
     async def end_lot(self, request: EndLot) -> LotView:
         """Store a lot's end with its audit entry."""
-        lot = await self._records.change(lambda connection: end_lot(connection, request.name))
-        await self._note(request, "lot.ended", {"ended_utc_ms": lot.ended_utc_ms})
-        return lot
+        by = request.actor.who, request.actor.role
+        return await self._records.change(lambda connection: end_lot(connection, request.name, by))
 
     async def note_export(self, request: NoteExport) -> Noted:
         """Store the audit entry of an export."""
-        await self._note(request, "records.exported", request.search.model_dump(mode="json", exclude_none=True))
+        search = request.search.model_dump(mode="json", exclude_none=True)
+        entry = AuditEntry(request.actor.who, request.actor.role, "records.exported", "records", new=search)
+        await self._records.audit(entry)
         return Noted()
-
-    async def _note(self, request: StartLot | EndLot | NoteExport, action: str, new: object) -> None:
-        subject = "records" if isinstance(request, NoteExport) else f"lot {request.name}"
-        await self._records.audit(AuditEntry(request.actor.who, request.actor.role, action, subject, new=new))

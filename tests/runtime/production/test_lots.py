@@ -274,8 +274,18 @@ def test_a_lot_in_place_of_which_another_is_started_has_ended_and_runs_when_it_i
             assert await running() == {"A"}
             assert (await give(cell, OperatorCommandName.END_LOT, "A")).state == "done"
             assert await running() == set()
+            return records_folder(cell.configuration.home)
 
-    asyncio.run(scenario())
+    with reading(asyncio.run(scenario())) as connection:
+        rows = [row for row in read_audit(connection, 100, "lot.") if row.who == "Ida"]
+    assert [(row.action, row.subject, row.new) for row in rows] == [
+        ("lot.told", "lot A", '{"grower":"Meier"}'),
+        ("lot.ended", "lot A", None),
+        ("lot.told", "lot B", '{"grower":"Huber"}'),
+        ("lot.ended", "lot B", None),
+        ("lot.told", "lot A", '{"grower":"Meier"}'),
+        ("lot.ended", "lot A", None),
+    ]
 
 
 def test_a_lot_whose_end_the_records_refuse_is_not_ended(bench, monkeypatch):
