@@ -109,7 +109,7 @@ class InspectionSummary(Model):
     trigger_id: int
     began: Moment = Field(validation_alias="began_utc_ms")
     duration_s: Annotated[float | None, BeforeValidator(lambda ms: None if ms is None else ms / 1000)] = Field(
-        validation_alias="duration_ms"
+        validation_alias="duration_ms", description="Null while it runs, and where the station was lost."
     )
     lot: str
     grower: str
@@ -147,7 +147,7 @@ class InspectionDetails(Model):
     encoder: int
     began: datetime
     ended: datetime | None
-    duration_s: float | None
+    duration_s: float | None = Field(description="Null while it runs, and where the station was lost.")
     lot: str
     simulated: bool = Field(description="A twin's device took part.")
     outcome: OutcomeName | None = Field(
@@ -184,7 +184,7 @@ class InspectionDetails(Model):
             encoder=trigger.encoder,
             began=moment(trigger.began_utc_ms),
             ended=None if standing is None else moment(standing.ended_utc_ms),
-            duration_s=None if standing is None else standing.duration_ms / 1000,
+            duration_s=None if standing is None else standing.duration_ms / 1000 or None,
             lot=trigger.lot,
             simulated=trigger.simulated,
             outcome=None if standing is None else standing.outcome,

@@ -38,8 +38,13 @@ class Column(NamedTuple):
 COLUMNS = (
     Column("sequence", pa.int64(), "i.sequence", "the inspection's number"),
     Column("began", _TIME, "i.began_utc_ms", "when the trigger was accepted, UTC"),
-    Column("ended", _TIME, "i.ended_utc_ms", "when it was judged, UTC"),
-    Column("duration_ms", pa.int64(), "i.duration_ms", "from trigger to outcome, by the monotonic clock"),
+    Column("ended", _TIME, _OUTCOME.format("ended_utc_ms"), "when the outcome was decided, UTC"),
+    Column(
+        "duration_ms",
+        pa.int64(),
+        f"nullif({_OUTCOME.format('duration_ms')}, 0)",
+        "from trigger to outcome, by the monotonic clock; empty where it is not known",
+    ),
     Column("trigger_id", pa.int64(), "i.trigger_id", "the PLC's"),
     Column("encoder", pa.int64(), "i.encoder", "the line's encoder at the trigger"),
     Column("lot", pa.string(), "i.lot", "as the PLC named it"),

@@ -118,8 +118,8 @@ def summarise(folder: Path, name: str) -> LotSummary:
         ).fetchall()
         limits, sized = _limits(ask, recipes[0][2]) if recipes else ((), False)
         mean_s, simulated, late = ask(
-            "SELECT avg(duration_ms) / 1000.0, sum(simulated), sum(json_extract(standing, '$.late')) FROM inspections "
-            "WHERE lot = ?",
+            "SELECT avg(nullif(json_extract(standing, '$.duration_ms'), 0)) / 1000.0, sum(simulated), "
+            "sum(json_extract(standing, '$.late')) FROM inspections WHERE lot = ?",
             (name,),
         ).fetchone()
         held = ask(

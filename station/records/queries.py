@@ -46,6 +46,7 @@ class Summary(NamedTuple):
     reasons: tuple[str, ...]
     areas_mm2: tuple[float | None, ...]
     duration_ms: int | None
+    """None while it runs, and where it is not known."""
 
 
 def read_open(connection: Connection) -> OpenInspections:
@@ -108,7 +109,7 @@ def read_inspection(connection: Connection, sequence: int, folder: Path) -> Full
 
 _SUMMARIES = """
 SELECT i.sequence, i.trigger_id, i.began_utc_ms, i.lot, coalesce(l.grower, ''), coalesce(r.name, 'none'), i.outcome,
-    json_extract(i.standing, '$.reasons'), i.duration_ms
+    json_extract(i.standing, '$.reasons'), nullif(json_extract(i.standing, '$.duration_ms'), 0)
 FROM inspections AS i
 LEFT JOIN recipe_snapshots AS r ON r.sha256 = i.recipe_sha256
 LEFT JOIN lots AS l ON l.name = i.lot

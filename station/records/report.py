@@ -50,7 +50,7 @@ def _described(record: FullRecord) -> Iterator[str]:
         "trigger",
         f"{trigger.trigger_id}, encoder {trigger.encoder}, lot {trigger.lot or 'not named'}, start {record.boot}",
     )
-    ended = "" if judged is None else f", took {judged.duration_ms / 1000:.3f} s"
+    ended = f", took {standing.duration_ms / 1000:.3f} s" if standing and standing.duration_ms else ""
     yield _field("begun", f"{_time(trigger.began_utc_ms)} UTC{ended}")
     if trigger.simulated:
         yield _field("simulated", "a twin's device took part")

@@ -10,12 +10,16 @@ from dataclasses import replace
 import pyarrow.parquet as pq
 import pytest
 
+from hmi.api.model import InspectionDetails, InspectionSummary
 from station.channel.line import Reason
 from station.messages import records as messages
 from station.outbox.feed import read_batch
 from station.records import export as exporting
+from station.records.database import reading
 from station.records.errors import DiskFullError
 from station.records.export import COLUMNS, export
+from station.records.lot_summary import summarise
+from station.records.queries import read_summaries
 from station.records.search import Query
 from tests.chromium import ARGUMENTS
 from tests.records.causes import because
@@ -83,6 +87,44 @@ def test_an_outcome_that_came_too_late_is_late_in_every_output(opened, scenario,
     text = (tmp_path / "lot.html").read_text(encoding="utf-8")
     assert "1 ended late." in text
     assert "1 of 2 fruit have an area." in text
+
+
+def test_one_fruit_has_one_duration_in_every_output(opened, scenario, trigger, passed, folder, ask, tmp_path):
+    """Of what the PLC received, also if the judgement followed; none where the station was lost."""
+    late = {"outcome": "NO_RESULT", "reasons": (Reason.LATE,), "late": True, "area_mm2": None, "area_px": None}
+
+    async def judged_and_late():
+        async with opened() as records:
+            sequence = await records.begin(trigger)
+            after = replace(passed, duration_ms=6400, ended_utc_ms=1_700_000_006_400)
+            judged = await records.conclude(await records.begin(trigger), after)
+            at = {"sequence": sequence, "duration_ms": 6000, "ended_utc_ms": 1_700_000_006_000}
+            await records.published(judged.model_copy(update={**late, **at}))
+            await records.conclude(sequence, after)
+            await records.published(judged)
+            await records.begin(trigger)
+
+    async def lost():
+        async with opened() as records:
+            [outcome] = [each for each in (await records.open_inspections()).ended if each.sequence == 3]
+            await records.published(outcome)
+            return [InspectionDetails.of(await records.inspection(number)) for number in (1, 2, 3)]
+
+    scenario(judged_and_late)
+    details = scenario(lost)
+    assert [each.duration_s for each in details] == [6.0, 6.4, None]
+    with reading(folder) as connection:
+        listed = [InspectionSummary.model_validate(each) for each in read_summaries(connection, [1, 2, 3])]
+    assert [each.duration_s for each in listed] == [None, 6.4, 6.0]
+    ask("export", tmp_path / "all.parquet")
+    rows = pq.read_table(tmp_path / "all.parquet").to_pylist()
+    events = [event.data for event in read_batch(folder, "s", 0).events if event.kind == "inspection"]
+    for told in (rows, sorted(events, key=lambda event: event["sequence"])):
+        assert [each["duration_ms"] for each in told] == [6000, 6400, None]
+    assert [row["ended"] for row in rows] == [each.ended for each in details]
+    assert summarise(folder, trigger.lot).mean_duration_s == 6.2
+    shown = [ask("show", number).output for number in (1, 2, 3)]
+    assert [re.findall(r"took (\S+) s", text) for text in shown] == [["6.000"], ["6.400"], []]
 
 
 @pytest.mark.parametrize("name", ["=1+1", "+1", "-1+2", "@SUM(A1)", "\t=1", "\r=1"])

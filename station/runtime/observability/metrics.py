@@ -72,7 +72,8 @@ class Metrics(Collector):
         fruit = fruit or "none"
         reason = outcome.reasons[0] if outcome.reasons else "none"
         self._of("inspections", fruit=fruit, outcome=outcome.outcome, reason=reason).inc()
-        self._of("duration", fruit=fruit).observe(outcome.duration_ms / 1000)
+        if outcome.duration_ms:  # not known of a fruit that the station lost
+            self._of("duration", fruit=fruit).observe(outcome.duration_ms / 1000)
         self._of("late", fruit=fruit).inc(outcome.late)
         self._of("second_presses", fruit=fruit).inc(0)  # a rate needs the count from before the first
         if deadline_s is not None:

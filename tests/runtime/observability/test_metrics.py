@@ -95,6 +95,13 @@ def test_names_follow_the_conventions(row):
         assert list(row.buckets) == sorted(set(row.buckets))
 
 
+def test_a_fruit_that_the_station_lost_has_no_duration(metrics, outcome):
+    metrics.inspection("strawberry", outcome.model_copy(update={"duration_ms": 0}))
+    found = scraped(metrics)
+    assert not [key for key in found if key[0] == "station_inspection_duration_seconds_count"]
+    assert [value for key, value in found.items() if key[0] == "station_inspections_total"] == [1]
+
+
 def test_the_figures_are_those_told(metrics, outcome, clock):
     everything_told(metrics, outcome)
     clock.now_s += 2.0
