@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import click
+from sqlalchemy import Connection, exists, select
 
 from station.channel.panel_queries import LotView
 from station.clock import formatted
@@ -10,17 +11,20 @@ from station.commands.records_options import by_option, folder_of, proof_options
 from station.commands.site import site_or_last_good
 from station.config_option import config_option
 from station.errors import StationError
+from station.messages import records as messages
 from station.records.audit import AuditEntry, append_audit
 from station.records.audit_check import Proof
 from station.records.backup import make_backup
 from station.records.database import reading, records_folder
+from station.records.errors import RecordsError
+from station.records.holds import describe_stored, read_holds
 from station.records.holds import hold as place_hold
-from station.records.holds import read_holds
 from station.records.holds import release as release_hold
 from station.records.images import MB
 from station.records.integrity_check import check_records
 from station.records.lots import end_lot, read_lots, start_lot
 from station.records.restore import restore_backup
+from station.records.schema import inspections
 from station.records.short_transaction import short_transaction
 from station.records.signing import public_keys_of
 from station.records.texts import printable
@@ -28,7 +32,12 @@ from station.settings.configuration import load_configuration
 
 _ROLE = "command line"
 _thing = click.argument("thing", metavar="SEQUENCE|LOT")
-_as_lot = click.option("--lot", "is_lot", is_flag=True, help="THING is a lot's name, though it is made of digits.")
+_as_lot = click.option(
+    "--lot/--inspection",
+    "is_lot",
+    default=None,
+    help="What THING is. Needed where a lot's name is made of digits, as an inspection's number is.",
+)
 
 
 @click.group()
@@ -77,15 +86,18 @@ def lot_list(grower: str | None, last: int, config: Path | None) -> None:
 @click.option("--reason", required=True, help="Why, for whoever asks later.")
 @by_option
 @config_option
-def hold(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None) -> None:
+def hold(thing: str, *, is_lot: bool | None, reason: str, by: str, config: Path | None) -> None:
     """Retain the images of an inspection, or all images of a lot: the quota does not remove them."""
     with short_transaction(folder_of(config)) as connection:
         before = read_holds(connection)
-        held = place_hold(connection, _number_or_lot(thing, is_lot=is_lot), reason, by)
+        meant = _number_or_lot(connection, thing, is_lot=is_lot)
+        held = place_hold(connection, meant, reason, by)
         if held not in before:
             append_audit(connection, AuditEntry(by, _ROLE, "images.held", held.description, reason))
+        stored = describe_stored(connection, meant)
     since = f"since {formatted(held.placed_utc_ms)}, by {held.by}: {held.reason}"
     click.echo(printable(f"the images of {held.description} are retained {since}"))
+    click.echo(f"stored of it: {stored}")
 
 
 @click.command()
@@ -94,10 +106,10 @@ def hold(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None)
 @click.option("--reason", required=True, help="Why, for whoever asks later.")
 @by_option
 @config_option
-def release(thing: str, *, is_lot: bool, reason: str, by: str, config: Path | None) -> None:
+def release(thing: str, *, is_lot: bool | None, reason: str, by: str, config: Path | None) -> None:
     """Release retained images: the quota may remove them."""
     with short_transaction(folder_of(config)) as connection:
-        released = release_hold(connection, _number_or_lot(thing, is_lot=is_lot), reason, by)
+        released = release_hold(connection, _number_or_lot(connection, thing, is_lot=is_lot), reason, by)
         entry = AuditEntry(by, _ROLE, "images.released", released.description, reason, {"held for": released.reason})
         append_audit(connection, entry)
     click.echo(printable(f"the images of {released.description} are no longer retained"))
@@ -176,8 +188,17 @@ def check(proof: Proof, config: Path | None) -> None:
         raise StationError("the records are not sound: see the faults above; a backup is put back by `records restore`")
 
 
-def _number_or_lot(thing: str, *, is_lot: bool) -> int | str:
-    return int(thing) if thing.isascii() and thing.isdigit() and not is_lot else thing
+def _number_or_lot(connection: Connection, thing: str, *, is_lot: bool | None) -> int | str:
+    """Return an inspection's number or a lot's name.
+
+    Raises:
+        RecordsError: it may be both.
+    """
+    if is_lot or not (thing.isascii() and thing.isdigit()):
+        return thing
+    if is_lot is None and connection.scalar(select(exists().where(inspections.c.lot == thing))):
+        raise RecordsError(messages.NUMBER_AND_LOT(lot=thing), messages.SAY_WHICH())
+    return int(thing)
 
 
 def _lot_line(row: LotView) -> str:

@@ -84,6 +84,9 @@ ANOTHER_GROWER = define("records.another_grower", "lot {lot} is registered for {
 INSPECTION_NOT_HELD = define(
     "records.inspection_not_held", "the images of inspection {number} are not retained", number=Number(0)
 )
+NUMBER_AND_LOT = define(
+    "records.number_and_lot", "a lot is named {lot}, and an inspection may have that number: nothing was changed"
+)
 LOT_NOT_HELD = define("records.lot_not_held", "the images of lot {lot} are not retained")
 NO_REASON = define("records.no_reason", "no reason was given")
 AUDIT_VALUE = define("records.audit_value", "the audit trail cannot hold {value}: {words}")
@@ -239,6 +242,7 @@ CORRECT_LOT = define(
     "give the new lot another name, or correct it: station records lot start --correct",
 )
 HOLDS_SHOW = define("records.holds_show", "`station records holds` lists those that are")
+SAY_WHICH = define("records.say_which", "repeat the command with --lot or with --inspection")
 GIVE_REASON = define("records.give_reason", "give a reason, for those who read it later")
 PROPER_WORD = define("records.proper_word", "give a proper {field}")
 SHORTER_TEXT = define("records.shorter_text", "give a shorter {field}, without control characters")

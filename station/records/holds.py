@@ -2,12 +2,13 @@
 
 from typing import NamedTuple
 
-from sqlalchemy import ColumnElement, Connection, Table, exists, insert, or_, select, update
+from sqlalchemy import ColumnElement, Connection, Table, distinct, exists, func, insert, or_, select, update
 
 from station.clock import utc_ms
 from station.messages import records as messages
 from station.records.errors import RecordsError
-from station.records.schema import holds, inspections
+from station.records.schema import holds, images, inspections
+from station.records.stored_message import images_state_of
 
 
 class Hold(NamedTuple):
@@ -69,6 +70,18 @@ def read_holds(connection: Connection) -> list[Hold]:
     """Read the active holds, oldest first."""
     rows = connection.execute(select(*_COLUMNS).where(holds.c.released_utc_ms.is_(None)).order_by(holds.c.id))
     return [Hold(*row) for row in rows]
+
+
+def describe_stored(connection: Connection, thing: int | str) -> str:
+    """Describe which images of an inspection or lot exist: what was removed, or never stored, no hold brings back."""
+    of_thing = _is(thing, inspections)
+    rows = select(inspections.c.images_state, func.count(images.c.id), func.count(distinct(images.c.sequence)))
+    joined = rows.outerjoin(images, images.c.sequence == inspections.c.sequence).where(of_thing)
+    state, stored, with_images = connection.execute(joined).one()
+    if isinstance(thing, int):
+        return f"{stored} images ({images_state_of(state or '') or 'it has not ended'})"
+    number = connection.scalar(select(func.count()).select_from(inspections).where(of_thing))
+    return f"images of {with_images} of {number} inspections"
 
 
 def is_held() -> ColumnElement[bool]:

@@ -48,6 +48,7 @@ def test_what_is_on_hold_stays_until_it_is_released(opened, scenario, inspected,
                 await inspected(records, 1, noise(side_px=320))
             said = await asyncio.to_thread(ask, "hold", 1, "--reason", "a complaint", "--by", "ada")
             assert "the images of inspection 1 are retained" in said.output
+            assert said.output.endswith("stored of it: 1 images (kept)\n")
             for _ in range(2):
                 await inspected(records, 1, noise(side_px=320))
             states = [(await records.inspection(number)).images_state for number in (1, 2, 3)]
@@ -64,11 +65,33 @@ def test_what_is_on_hold_stays_until_it_is_released(opened, scenario, inspected,
 
     scenario(steps)
     assert ask("holds").output == ""
+    again = ask("hold", 1, "--reason", "too late").output
+    assert again.endswith("stored of it: 0 images (removed: space for newer ones)\n")
+    assert ask("hold", "A-17", "--reason", "the lot").output.endswith("stored of it: images of 3 of 7 inspections\n")
+    for arguments in (("release", 1), ("release", "A-17")):
+        assert ask(*arguments, "--reason", "tried").exit_code == 0
     for arguments in (("hold", 99), ("release", 1), ("hold", "nowhere")):
         said = ask(*arguments, "--reason", "why not")
         assert said.exit_code == 1
         assert "records list` shows" in str(said.exception) or "are not retained" in str(said.exception)
     assert ask("hold", 1, "--reason", " ").exit_code == 1
+
+
+def test_a_lot_that_is_named_by_a_number_is_not_taken_for_an_inspection(opened, scenario, passed, trigger, ask):
+    async def steps():
+        async with opened() as records:
+            for lot in ("2", "A-17"):
+                await records.published(await records.conclude(await records.begin(replace(trigger, lot=lot)), passed))
+
+    scenario(steps)
+    for command in ("hold", "release"):
+        refused = ask(command, 2, "--reason", "a complaint")
+        assert (refused.exit_code, refused.exception.cause) == (1, messages.NUMBER_AND_LOT(lot="2"))
+    assert "inspection 1 are retained" in ask("hold", 1, "--reason", "no lot has that name").output
+    assert "lot 2 are retained" in ask("hold", 2, "--lot", "--reason", "a complaint").output
+    held = ask("hold", 2, "--inspection", "--reason", "a complaint").output
+    assert "inspection 2 are retained" in held
+    assert held.endswith("stored of it: 0 images (not kept, by the settings of the records)\n")
 
 
 def test_a_backup_while_the_station_writes_is_whole_and_can_be_put_back(
