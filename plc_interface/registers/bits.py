@@ -22,7 +22,7 @@ CONTROL_BITS = _bits(
     ("acknowledge", "Rising edge: the result with the acknowledged sequence is taken; hold until result_valid falls"),
     ("buffer_results", "On: up to 8 results wait for their acknowledgement. Off: one; a trigger before it is refused"),
     ("execute_command", "Rising edge: execute the command code with its argument; hold until done or failed"),
-    ("clear_error", "Rising edge: overrun, missed and the last refusal are cleared"),
+    ("clear_error", "Rising edge: overrun, missed, the last refusal and the reject gate's failures are cleared"),
     ("offline", "The PLC takes the station out of the line: every trigger is refused"),
     ("latch_lot", "Rising edge: the lot id is taken for the inspections from here on; hold until latched"),
     ("reset_counters", "Rising edge: the counters start at 0 and the epoch is raised"),

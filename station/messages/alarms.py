@@ -194,7 +194,9 @@ GATE_NOT_FIRED = AlarmTexts(
     define("alarm.cause.gate_not_fired", "The reject gate did not confirm that it fired for a fruit."),
     define("alarm.consequence.gate_not_fired", "A rejected fruit may be among the good ones."),
     define(
-        "alarm.action.gate_not_fired", "Take the fruit from the line behind the gate; check the gate's air and valve."
+        "alarm.action.gate_not_fired",
+        "Take the fruit from the line behind the gate; check the gate's air and valve. Acknowledging ends this alarm; "
+        "each further failure raises it again.",
     ),
 )
 RECORDS_NOT_WRITABLE = AlarmTexts(

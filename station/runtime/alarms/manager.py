@@ -46,6 +46,8 @@ OF_DEVICE: dict[str, frozenset[AlarmId]] = {
 }
 """Alarms that only the device monitors raise; all are cleared once each of their devices is healthy."""
 
+_OF_THE_PAST = {AlarmId.RECORDS_LOST, AlarmId.GATE_NOT_FIRED}
+"""Alarms of what has happened once, which no check finds undone: a person's acknowledgement ends them."""
 _MOST_UNSAVED = 1000
 _ARM = {
     ArmCause.EMERGENCY_STOP: AlarmId.EMERGENCY_STOP,
@@ -162,7 +164,7 @@ class AlarmManager:
     def acknowledge(self, alarm: AlarmId) -> bool:
         """Acknowledge an alarm, and return whether that changed anything."""
         changed = self._set(self.alarms.acknowledge(alarm), alarm, "acknowledged")
-        if changed and alarm is AlarmId.RECORDS_LOST:  # no check ever finds lost records back
+        if changed and alarm in _OF_THE_PAST:
             self.clear(alarm)
         return changed
 

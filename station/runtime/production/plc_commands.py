@@ -67,6 +67,8 @@ class PlcCommands:
         self.last_report: Line | None = None
         """The PLC interface's last message; None if there was none."""
         self._line_at_s: float | None = None
+        self._failed_rejects: list[Message] = []
+        """Failed reject actuations as last reported, the oldest first."""
         self._turn = asyncio.Lock()
         self._stop_wanted = False
         """By the last order of a person, also before its file has it."""
@@ -134,9 +136,21 @@ class PlcCommands:
         alarms.update(AlarmId.PLC_INTERFACE_LOST, self.line_fault() if silent else None)
         alarms.update(AlarmId.PLC_HEARTBEAT_LOST, None if silent else self.line_fault())
         faults = {fault.part: fault.what for fault in reversed(line.faults)}
-        alarms.update(AlarmId.GATE_NOT_FIRED, faults.get("reject"))
+        self._update_reject_alarm([fault.what for fault in line.faults if fault.part == "reject"])
         alarms.update(AlarmId.CAN_NODE_LOST, faults.get("can"))
         alarms.update(AlarmId.PLC_JOURNAL_NOT_WRITABLE, faults.get("journal"))
+
+    def _update_reject_alarm(self, failures: list[Message]) -> None:
+        """Raise the alarm anew for each failed reject actuation: every one may have left a fruit among the good ones.
+
+        The PLC interface reports a failure until the PLC's `clear_error`, also after a person has acknowledged it.
+        """
+        new = [failure for failure in failures if failure not in self._failed_rejects]
+        self._failed_rejects = failures
+        if new or not failures:
+            self._service.alarms.clear(AlarmId.GATE_NOT_FIRED)
+        if new:
+            self._service.alarms.raise_(AlarmId.GATE_NOT_FIRED, new[-1])
 
     async def execute(self, command: Command, by: tuple[str, str] = (PLC, PLC)) -> CommandDone:
         """Execute one command by the name and role of who gave it."""

@@ -9,8 +9,11 @@ import pytest
 from station.channel.line import Line, LineFault
 from station.channel.panel_maintenance_queries import GetRegisters
 from station.inspection.alarm_table import AlarmId
+from station.inspection.alarms import AlarmState
+from station.messages.can import UNORDERED_REPORT
 from station.messages.line import JOURNAL_NOT_WRITTEN
 from station.messages.message import verbatim
+from station.runtime.alarms.manager import AlarmManager
 from station.runtime.production.plc_commands import PlcCommands
 from station.runtime.rpc import maintenance
 from station.runtime.rpc.maintenance import PanelMaintenance
@@ -23,15 +26,16 @@ ALARMS = {
 
 
 @pytest.fixture
-def shown():
-    """The alarms as last updated."""
-    return {}
+def alarms():
+    """The alarms of a station that is not there."""
+    metrics: Any = SimpleNamespace(alarms=lambda _: None)
+    return AlarmManager(metrics)
 
 
 @pytest.fixture
-def commands(shown):
-    """The PLC commands of a station that is not there."""
-    service: Any = SimpleNamespace(alarms=SimpleNamespace(update=shown.__setitem__))
+def commands(alarms):
+    """The PLC commands of that station."""
+    service: Any = SimpleNamespace(alarms=alarms)
     metrics = SimpleNamespace(heard=lambda _: None, waiting=lambda _: None)
     observability: Any = SimpleNamespace(metrics=metrics, audit=None)
     nothing: Any = None
@@ -51,18 +55,45 @@ def beat(commands):
     return given
 
 
+def active(alarms):
+    return {alarm.id: alarm.detail for alarm in alarms.alarms.active}
+
+
+def rejected(*sequences):
+    """The faults of reject actuations that failed, in their order."""
+    return tuple(LineFault(part="reject", what=UNORDERED_REPORT(sequence=sequence)) for sequence in sequences)
+
+
 @pytest.mark.parametrize("part", ALARMS)
-def test_a_fault_of_the_interface_is_an_alarm_until_it_is_gone(shown, beat, part):
+def test_a_fault_of_the_interface_is_an_alarm_until_it_is_gone(alarms, beat, part):
     what = JOURNAL_NOT_WRITTEN(file="plc/journal.json", error="Read-only file system")
     beat(LineFault(part=part, what=what))
-    assert {alarm: detail for alarm, detail in shown.items() if detail is not None} == {ALARMS[part]: what}
+    assert active(alarms) == {ALARMS[part]: what}
     beat()
-    assert set(shown.values()) == {None}
+    assert active(alarms) == {}
 
 
-def test_a_fault_of_the_handshake_is_the_plcs_and_no_alarm(shown, beat):
+def test_each_fruit_that_the_gate_missed_is_announced_anew(alarms, beat):
+    beat(*rejected(17))
+    alarms.acknowledge(AlarmId.GATE_NOT_FIRED)
+    beat(*rejected(17))
+    assert active(alarms) == {}, "a person's acknowledgement ends it, although the PLC interface still reports it"
+    beat(*rejected(17, 42))
+    (alarm,) = alarms.alarms.active
+    assert (alarm.state, alarm.detail) == (AlarmState.UNACKNOWLEDGED, UNORDERED_REPORT(sequence=42))
+
+
+def test_a_failed_reject_that_is_reported_again_is_announced_once(alarms, beat):
+    beat(*rejected(17, 42))
+    beat(*rejected(17, 42, 17))
+    alarms.acknowledge(AlarmId.GATE_NOT_FIRED)
+    beat(*rejected(42, 17, 42))
+    assert active(alarms) == {}
+
+
+def test_a_fault_of_the_handshake_is_the_plcs_and_no_alarm(alarms, beat):
     beat(LineFault(part="handshake", what=verbatim("the PLC did not reset its trigger bit")))
-    assert set(shown.values()) == {None}
+    assert active(alarms) == {}
 
 
 def test_the_page_of_the_registers_gets_the_handshakes_faults_alone(commands, beat, monkeypatch):
