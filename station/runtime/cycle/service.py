@@ -64,6 +64,8 @@ class Service:
         self._automatic_reset = self._settings.automatic_reset and self._hold.event is None
         self._reset_given = False
         """By a person or the PLC, and not carried out yet."""
+        self._confirmed_before = self._hold.event is None
+        """The process before left no hold: a stop whose alarm is still latched was confirmed by a person."""
         self._in_production = True
         self.manual_activity: Message | None = None
         """The activity at the panel that moves something by hand, in manual mode alone; None without one."""
@@ -281,8 +283,9 @@ class Service:
             self._automatic_reset = self._reset_given = False
         if state is State.IDLE:
             self.alarms.clear(AlarmId.FRUIT_HELD)
-            if self._reset_given:
+            if self._reset_given or self._confirmed_before:
                 self.alarms.reset()
+                self._confirmed_before = False
             self._automatic_reset, self._reset_given = self._settings.automatic_reset, False
         if state is State.STOPPED and self.makes_itself_ready:
             self.runner.post(Event.RESET)

@@ -17,8 +17,9 @@ from station.records.records import Records
 from station.runtime.devices.manager import GRIPPER
 from station.runtime.production import plc_commands
 from station.runtime.production.housekeeping import Housekeeping
+from station.runtime.station import Station
 from station.supervision.restarts import RESTARTS_VARIABLE, Restarts, publish
-from tests.eventually import until
+from tests.eventually import PATIENCE_S, until
 
 # No alarm more than twice: one that comes a third time within a minute chatters, and stays.
 WATCHED = {
@@ -187,6 +188,40 @@ def test_a_reset_that_a_lost_camera_delays_ends_the_stops_alarm_once_the_station
             cell.twin.boards["camera"].clear()
             await cell.reach(State.IDLE)
             assert AlarmId.EMERGENCY_STOP not in active(cell)
+
+    asyncio.run(scenario())
+
+
+def test_a_restart_after_a_persons_reset_leaves_no_latched_alarm_behind(bench, monkeypatch):
+    async def scenario():
+        async with bench() as cell:
+            await cell.choose("blueberry")
+            cell.twin.boards["gripper"].set("emergency_stopped")
+            await cell.reach(State.LATCHED)
+            cell.twin.boards["camera"].set("off")
+            await until(lambda: "camera" in cell.station.service._devices.faults)
+            cell.twin.boards["gripper"].clear()
+            await until(lambda: not caused(cell, AlarmId.EMERGENCY_STOP))
+            monkeypatch.setattr(plc_commands, "DEADLINE_S", 0.5)
+            assert (await cell.line.order(CommandName.RESET)).why.id == commands.TOO_SLOW.id
+            await cell.until(lambda: cell.phase is State.UNKNOWN)
+            load_alarms = cell.station.service.registry.records.load_alarms
+            stored = (AlarmId.EMERGENCY_STOP, AlarmState.LATCHED_UNACKNOWLEDGED)
+            async with asyncio.timeout(PATIENCE_S):
+                while stored not in [(row.id, row.state) for row in await load_alarms()]:
+                    await asyncio.sleep(0.05)
+            cell.station.stop()
+            await cell.running
+            cell.twin.boards["camera"].clear()
+            cell.station = Station(cell.configuration, "")
+            cell.running = asyncio.create_task(cell.station.run(lambda _port: None))
+            try:
+                await until(lambda: cell.station.service is not None and AlarmId.EMERGENCY_STOP in active(cell))
+                await cell.until(lambda: cell.phase is State.IDLE)
+                assert AlarmId.EMERGENCY_STOP not in active(cell)
+            finally:
+                cell.station.stop()
+                await cell.running
 
     asyncio.run(scenario())
 
