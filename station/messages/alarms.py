@@ -70,7 +70,7 @@ ARM_NOT_REMOTE = AlarmTexts(
     define(
         "alarm.action.arm_not_remote",
         "Switch the pendant to remote control, then start the arm's program on the page Run, or by"
-        " `station devices recover program`.",
+        " `station devices recover program`. After a stop on the pendant also confirm at the panel.",
     ),
 )
 ARM_NOT_READY = AlarmTexts(

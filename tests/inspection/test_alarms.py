@@ -53,7 +53,7 @@ def test_what_provokes_an_alarm_is_a_fault_that_the_twin_has():
 
 def test_the_cycle_raises_alarms_that_a_person_must_end_only_where_one_is_needed():
     raised = {action.alarm for t in TABLE.values() for action in t.actions if isinstance(action, Raise)}
-    of_devices = {AlarmId.ARM_NOT_REMOTE}  # a stop on the pendant has local control's, which ends with its cause
+    of_devices = {AlarmId.ARM_NOT_REMOTE}  # a stop on the pendant has local control's, which is kept, not latched
     assert {alarm for alarm, row in ALARMS.items() if row.latched} == raised - {AlarmId.DEADLINE_MISSED} - of_devices
 
 

@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import time
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 
 from station.clock import utc_ms
 from station.devices.arm.faults import ArmCause, ArmFault
@@ -98,6 +98,7 @@ class AlarmManager:
         """
         self.alarms = Alarms()
         """All alarms, as a value."""
+        self._stopped_on_pendant: Callable[[], bool] = lambda: False
         self._metrics = metrics
         self._present: set[AlarmId] = set()
         self._to_restore = to_restore
@@ -150,13 +151,19 @@ class AlarmManager:
             for alarm in alarms - watched:
                 self.clear(alarm)
 
+    def keep_pendant_alarm(self, stopped_on_pendant: Callable[[], bool]) -> None:
+        """Keep the alarm of a stop on the pendant while the cycle is stopped by it, also once the arm is healthy."""
+        self._stopped_on_pendant = stopped_on_pendant
+
     def set_device_fault(self, device: str, fault: StationError | None) -> None:
         """Raise the alarm of the fault of the `arm`, `gripper` or `camera`, or clear the alarms of a healthy one."""
         told = None if fault is None else alarm_of(device, fault)
         before, self._device_alarms[device] = self._device_alarms.get(device), told
-        unheard = {alarm for name in self._watched if name not in self._device_alarms for alarm in OF_DEVICE[name]}
+        kept = {alarm for name in self._watched if name not in self._device_alarms for alarm in OF_DEVICE[name]}
+        if self._stopped_on_pendant():
+            kept.add(AlarmId.ARM_NOT_REMOTE)
         for alarm in OF_DEVICE[device] | ({before} if before is not None else set()):
-            if alarm not in self._device_alarms.values() and alarm not in unheard:
+            if alarm not in self._device_alarms.values() and alarm not in kept:
                 self.clear(alarm)
         if told is not None and fault is not None:
             self.update(told, message_of(fault))

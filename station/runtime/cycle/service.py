@@ -55,6 +55,7 @@ class Service:
         self.alarms, self._metrics, self._liveness = alarms, observability.metrics, observability.liveness
         self._carries = self._settings.placing == "arm" and not self._settings.bench
         self._hold = Hold(StateFiles(configuration.home), carries=self._carries)
+        alarms.keep_pendant_alarm(lambda: self._hold.event is Event.PROGRAM_STOPPED)
         self.runner = CycleRunner(self, self._hold.event)
         self.triggers = RecentTriggers()
         self.registry = InspectionRegistry(records, self.triggers, devices, observability.versions)

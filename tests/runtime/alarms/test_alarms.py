@@ -14,7 +14,7 @@ from station.inspection.states import State
 from station.messages import commands
 from station.records.model import StoredAlarm
 from station.records.records import Records
-from station.runtime.devices.manager import GRIPPER
+from station.runtime.devices.manager import ARM, GRIPPER
 from station.runtime.production import plc_commands
 from station.runtime.production.housekeeping import Housekeeping
 from station.runtime.station import Station
@@ -222,6 +222,25 @@ def test_a_restart_after_a_persons_reset_leaves_no_latched_alarm_behind(bench, m
             finally:
                 cell.station.stop()
                 await cell.running
+
+    asyncio.run(scenario())
+
+
+def test_the_alarm_of_a_stop_on_the_pendant_stays_until_a_person_has_confirmed(bench):
+    async def scenario():
+        async with bench(bench=False) as cell:
+            await cell.choose("blueberry")
+            devices = cell.station.service._devices
+            cell.twin.boards["arm"].set("pendant_stop")
+            await cell.until(lambda: cell.phase is State.LATCHED and ARM in devices.faults)
+            cell.twin.boards["arm"].clear()
+            await devices.recover("program")
+            await cell.until(lambda: ARM not in devices.faults)
+            cell.station.service.alarms.update_device(devices.monitors[ARM])
+            assert cell.phase is State.LATCHED
+            assert AlarmId.ARM_NOT_REMOTE in active(cell)
+            assert (await cell.line.order(CommandName.RESET)).done
+            await cell.until(lambda: AlarmId.ARM_NOT_REMOTE not in active(cell))
 
     asyncio.run(scenario())
 
