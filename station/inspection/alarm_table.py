@@ -125,7 +125,7 @@ ALARMS: dict[AlarmId, AlarmRow] = {
     AlarmId.MANY_NO_RESULT: AlarmRow(28, Priority.MEDIUM, texts.MANY_NO_RESULT),
     AlarmId.REJECT_RATE: AlarmRow(29, Priority.LOW, texts.REJECT_RATE),
     AlarmId.DEADLINE_MISSED: AlarmRow(30, Priority.LOW, texts.DEADLINE_MISSED),
-    AlarmId.CALIBRATION_OLD: AlarmRow(31, Priority.LOW, texts.CALIBRATION_OLD),
+    AlarmId.CALIBRATION_OLD: AlarmRow(31, Priority.MEDIUM, texts.CALIBRATION_OLD),
     AlarmId.HMI_LOST: AlarmRow(32, Priority.LOW, texts.HMI_LOST),
     AlarmId.OUTBOX_BEHIND: AlarmRow(33, Priority.LOW, texts.OUTBOX_BEHIND),
     AlarmId.CONNECTION_FLOOD: AlarmRow(34, Priority.LOW, texts.CONNECTION_FLOOD),

@@ -283,7 +283,8 @@ DEADLINE_MISSED = AlarmTexts(
 CALIBRATION_OLD = AlarmTexts(
     define(
         "alarm.cause.calibration_old",
-        "The sensor is not calibrated, its calibration is older than allowed, or its last verification failed.",
+        "The sensor is not calibrated, its calibration is older than allowed, its last verification failed, or a "
+        "required verification is due.",
     ),
     define(
         "alarm.consequence.calibration_old",

@@ -115,17 +115,22 @@ def test_age_and_a_failed_verification_are_told(stored, draft, tmp_path):
 def test_nothing_is_ready_without_the_verification_that_is_demanded(stored, draft, tmp_path):
     made_at = draft.calibration.made_at
     assert in_use(tmp_path, made_at).refusal() is None
-    assert "not calibrated" in str(
-        in_use(tmp_path, made_at, "D11111", verify_every_h=8.0, uncalibrated="allow").refusal()
-    )
+    another = in_use(tmp_path, made_at, "D11111", verify_every_h=8.0, uncalibrated="allow")
+    assert "not calibrated" in str(another.refusal())
+    assert another.alarm_detail() == messages.MISSING()
     demanded = in_use(tmp_path, made_at + timedelta(hours=9), verify_every_h=8.0)
     assert "never verified" in str(demanded.refusal())
+    assert demanded.alarm_detail() == demanded.refusal()
     stored.add_verification(verification(draft.calibration, made_at + timedelta(hours=0.5)), {})
     assert "8.5 h old, at most 8 h" in str(demanded.refusal())
+    assert demanded.alarm_detail() == demanded.refusal()
     stored.add_verification(verification(draft.calibration, made_at + timedelta(hours=8)), {})
-    assert demanded.refusal() is None
+    assert (demanded.refusal(), demanded.alarm_detail()) == (None, None)
     stored.add_verification(verification(draft.calibration, made_at + timedelta(hours=8.5), FAILED), {})
     assert "by `station verify`" in str(demanded.refusal())
+    failed = demanded.alarm_detail()
+    assert failed is not None
+    assert messages.CHECK_WEAR.id in failed.ids()
 
 
 def test_a_sensor_without_a_calibration_is_refused_and_an_alarm_unless_it_is_allowed(stored, draft, tmp_path):

@@ -109,8 +109,11 @@ class ActiveCalibration:
         """Return the detail of the alarm calibration_old; None for no alarm."""
         calibration, verified = self.calibration, self._verification
         if calibration is None:
-            needed = self._required and self._serial()
+            needed = (self._required or self._settings.verify_every_h is not None) and self._serial()
             return messages.MISSING() if needed else None
+        # Why triggers are refused comes first; the failed checks, which say more of a failed verification, come below.
+        if (why := self.refusal()) and (verified is None or verified.passed):
+            return why
         age_days = (self.figures.age_s or 0.0) / _DAY_S
         if age_days > self._settings.oldest_days:
             return messages.OLD(age_days=age_days, limit_days=self._settings.oldest_days)
