@@ -9,7 +9,7 @@ from collections.abc import Callable
 from station.channel.panel import RecoveryName
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.ur import UrArm
-from station.devices.camera.interface import CameraError, describe
+from station.devices.camera.interface import CameraError, Leds, describe
 from station.devices.camera.open import camera_from
 from station.devices.gripper.errors import (
     NEEDS_ACTIVATION,
@@ -76,6 +76,7 @@ class DeviceManager:
             or (arm is not None and configuration.arm.host.startswith("127."))
             or (configuration.gripper.driver == "urcap" and configuration.gripper.urcap.host.startswith("127."))
         )
+        self._light_by_hand = False
         self._confirmed_clear = False
         self._recovery = asyncio.Lock()
         """Held while a lost activation is being restored, which may move the arm and moves the fingers."""
@@ -304,6 +305,26 @@ class DeviceManager:
                 return False
             await asyncio.sleep(_STOP_POLL_S)
         return True
+
+    async def set_light(self, light: Leds) -> None:
+        """Set the sensor's light by hand, until `restore_light`.
+
+        Raises:
+            CameraError: the camera does not answer.
+        """
+        self._light_by_hand = True
+        await self.cell.camera.set_leds(light)
+
+    async def restore_light(self) -> None:
+        """Set the configuration's light again where a person has set another: fruit is measured in no other.
+
+        Raises:
+            CameraError: the camera does not answer.
+        """
+        if self._light_by_hand:
+            light = self._configuration.camera.digit
+            await self.cell.camera.set_leds(Leds(light.red, light.green, light.blue))
+            self._light_by_hand = False
 
     async def _check_camera(self) -> None:
         await self.cell.camera.open()

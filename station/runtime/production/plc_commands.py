@@ -10,6 +10,7 @@ from station.channel.line import Command, CommandDone, CommandName, Line, Regist
 from station.channel.panel import Recover
 from station.channel.server import is_expired
 from station.devices.arm.faults import ArmFault
+from station.devices.camera.interface import CameraError
 from station.errors import BadInputError
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import UNJUDGED, WAITING, Event
@@ -208,6 +209,11 @@ class PlcCommands:
         activity = self._service.manual_activity
         if activity is not None and mode != self.mode:
             return messages.MODE_KEPT(activity=activity)
+        if mode != MANUAL:
+            try:
+                await self._devices.restore_light()
+            except CameraError as error:
+                return message_of(error)
         self.mode = mode
         self._service.set_mode(production=mode == PRODUCTION)
         # A write that outlasts its order is not left behind, or it could replace the next order's.

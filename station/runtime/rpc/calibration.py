@@ -190,6 +190,7 @@ class PanelCalibration:
 
     async def _run_procedure(self, run: _Run, request: StartCalibrationRun) -> None:
         try:
+            await self._devices.restore_light()
             result = await (self._calibrate(run, request) if run.kind == "calibration" else self._verify(run))
         except asyncio.CancelledError:
             run.state, run.result = "ended", messages.CALLED_OFF()

@@ -169,9 +169,14 @@ class PanelMaintenance:
         return Jogged(width_mm=reading.width_mm, object_state=reading.object_state.value, active=reading.active)
 
     async def set_leds(self, request: SetLeds) -> LedsSet:
-        """Set the sensor's light; the next start of the camera sets its own again."""
+        """Set the sensor's light; the end of manual mode, a calibration and a verification restore the configuration's.
+
+        Raises:
+            NotNowError: refused in this state.
+            CameraError: the camera does not answer.
+        """
         self._check(request.actor, "maintenance.leds", "camera")
-        await self._devices.cell.camera.set_leds(Leds(request.red, request.green, request.blue))
+        await self._devices.set_light(Leds(request.red, request.green, request.blue))
         self._note(request.actor, "maintenance.leds", "camera", [request.red, request.green, request.blue])
         return LedsSet()
 

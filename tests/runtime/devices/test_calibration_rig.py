@@ -4,6 +4,7 @@ import asyncio
 import time
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import AsyncMock
 
 import pytest
 
@@ -71,7 +72,8 @@ class Panel:
         gripper_and_arm: Any = self.devices
         cell = Cell(camera, gripper_and_arm, gripper_and_arm)
         site: Any = SimpleNamespace(home=home, service=SimpleNamespace(patience=1.0))
-        production: Any = SimpleNamespace(service=self.service, devices=SimpleNamespace(cell=cell))
+        devices = SimpleNamespace(cell=cell, restore_light=AsyncMock())
+        production: Any = SimpleNamespace(service=self.service, devices=devices)
         unused: Any = None
         self.calibration = PanelCalibration(site, production, unused, unused, unused, lambda: None)
         self.run = _Run("calibration", MAX)
