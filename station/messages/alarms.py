@@ -169,7 +169,8 @@ REFERENCE_DRIFTING = AlarmTexts(
 PLC_HEARTBEAT_LOST = AlarmTexts(
     define(
         "alarm.cause.plc_heartbeat_lost",
-        "The line's PLC is connected and its heartbeat does not change, or it is not connected.",
+        "The line's PLC had set `enable`, then its heartbeat stopped or its connection was lost. A PLC that has not "
+        "set `enable` since the PLC interface's start raises no alarm.",
     ),
     define("alarm.consequence.plc_heartbeat_lost", "No triggers come; results wait."),
     define(
