@@ -224,7 +224,7 @@ CONFIGURATION_BROKEN = AlarmTexts(
     define("alarm.consequence.configuration_broken", "The last good configuration is used."),
     define(
         "alarm.action.configuration_broken",
-        "Correct the line that the detail names; `station devices check` reports whether it is good. Then start the "
+        "Correct the line that the detail names; `station config check` reports whether it is good. Then start the "
         "station again.",
     ),
 )
