@@ -229,6 +229,12 @@ class DeviceManager:
         return fault if isinstance(fault, ArmFault) and fault.cause is ArmCause.NOT_POWERED else None
 
     @property
+    def program_stopped(self) -> bool:
+        """Check whether a person has stopped the arm's program on the pendant."""
+        fault = self.faults.get(ARM)
+        return isinstance(fault, ArmFault) and fault.cause is ArmCause.PROGRAM_STOPPED
+
+    @property
     def needs_program_restart(self) -> bool:
         """Check whether the arm stopped only because this station was too slow for the controller's watchdog.
 

@@ -315,15 +315,24 @@ class PlcCommands:
         if why_not := self.reset_refusal() or (readiness.STOPPED_BY_PERSON() if kept else None):
             return why_not
         state, self._stop_wanted = service.state, False
+        ordered_s, program_stopped = time.monotonic(), self._devices.program_stopped
         service.allow()
         # As of a mode: a write that outlasts the reset's deadline could replace that of a stop that comes next.
         self._storing_reset = asyncio.create_task(self._store_stop())
         await asyncio.shield(self._storing_reset)
-        if service.stopped_by_person:
+        await service.runner.taken()
+        # The disk may take seconds, and a person's stop in them is the later order, also before its own write ends.
+        if self._stop_wanted or service.stopped_by_person:
             return messages.STOPPED_MEANWHILE()
         if state in {State.IDLE, State.RETREATING_READY}:
             service.alarms.reset()
             return None
+        why_not = self.reset_refusal() or self._later_stop(ordered_s, program_stopped=program_stopped)
+        return why_not or await self._make_ready(ordered_s, program_stopped=program_stopped)
+
+    async def _make_ready(self, ordered_s: float, *, program_stopped: bool) -> Message | None:
+        """Make the station ready from the state that it is in by now; the arguments are those of `_later_stop`."""
+        service, state = self._service, self._service.state
         service.request_reset()
         self._devices.confirm_clear()
         if state not in {State.LATCHED, State.STOPPED}:
@@ -331,6 +340,8 @@ class PlcCommands:
                 await self._devices.restart_program()
             except ArmFault as fault:
                 return message_of(fault)
+            if why_not := self._later_stop(ordered_s, program_stopped=program_stopped):
+                return why_not
         if activity := service.manual_activity:  # begun while this reset waited
             return UNDER_WAY(activity=activity)
         if state is State.STOPPED:
@@ -338,6 +349,18 @@ class PlcCommands:
         elif state in {State.LATCHED, State.CARRIED}:
             service.runner.post(Event.PERSON_CONFIRMED, operation.RESET())
         return await self._until_ready()
+
+    def _later_stop(self, ordered_s: float, *, program_stopped: bool) -> Message | None:
+        """Return what asks for a person since a reset was ordered, who cannot have confirmed it; None for nothing.
+
+        Args:
+            ordered_s: monotonic time of the reset.
+            program_stopped: a person had stopped the arm's program on the pendant by then.
+        """
+        runner = self._service.runner
+        latched = STATES[runner.state].needs_person and runner.entered_s > ordered_s
+        stopped = self._devices.program_stopped and not program_stopped
+        return self._activity() if latched or stopped else None
 
     async def _until_ready(self) -> Message | None:
         """Wait for what a reset has begun; return why the station is not ready."""

@@ -1,13 +1,19 @@
-"""The deadline of a command that waits for the one before."""
+"""A command that waits: for the one before, or for the disk."""
 
 import asyncio
 import threading
+import time
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
 from station.channel.line import Command, CommandName
+from station.devices.arm.faults import ArmCause, ArmFault
+from station.inspection.cycle import Event
 from station.inspection.states import State
 from station.messages import commands as messages
+from station.messages.arm import EMERGENCY_STOP
 from station.runtime.production import plc_commands
 from station.runtime.production.plc_commands import PlcCommands
 
@@ -22,7 +28,7 @@ def made(state_files: Any = None):
         runner=SimpleNamespace(taken=lambda: asyncio.sleep(0)),
     )  # fmt: skip
     observability: Any = SimpleNamespace(metrics=None, audit=SimpleNamespace(log=lambda *_: None))
-    devices: Any = SimpleNamespace(faults={}, active_stop=None, power_missing=None)
+    devices: Any = SimpleNamespace(faults={}, active_stop=None, power_missing=None, program_stopped=False)
     nothing: Any = None
     return PlcCommands(service, devices, nothing, nothing, state_files, observability)
 
@@ -77,3 +83,117 @@ def test_a_stop_is_what_the_file_has_also_where_the_disk_outlasts_the_reset_befo
 
     asyncio.run(main())
     assert written == [b"no", b"yes"]
+
+
+class Station:
+    """Service and runner in one state, which note what is posted; nothing moves."""
+
+    def __init__(self, state: State) -> None:
+        self.state, self.entered_s, self.posted = state, 0.0, list[Event]()
+        self.active, self.manual_activity = None, None
+        self.ending = self.stopped_by_person = False
+        self.runner = self.alarms = self
+
+    def stop(self) -> None:
+        self.stopped_by_person = True
+
+    def allow(self) -> None:
+        self.stopped_by_person = False
+
+    def request_reset(self) -> None:
+        pass
+
+    def post(self, event: Event, _why: object = None) -> None:
+        self.posted.append(event)
+        self.state = State.IDLE
+
+    async def taken(self) -> None:
+        pass
+
+    async def until(self, _wanted: object) -> State:
+        return self.state
+
+    async def end_manual(self) -> None:
+        pass
+
+
+class SlowDisk:
+    """State files whose writes begin in their order, and end when they are freed."""
+
+    def __init__(self) -> None:
+        self.begun, self.free = (threading.Event(), threading.Event()), (threading.Event(), threading.Event())
+        self._writes = 0
+
+    def write(self, _name: str, _data: bytes) -> bool:
+        number, self._writes = self._writes, self._writes + 1
+        self.begun[number].set()
+        return self.free[number].wait(30)
+
+
+def resetting(state: State):
+    """Return commands, the station and the disk of a reset that is ordered in a state."""
+    commands, station, disk = made(), Station(state), SlowDisk()
+    commands._service, commands._state_files = station, disk  # type: ignore[assignment]
+    commands._devices.confirm_clear = lambda: None
+    commands._devices.end_recovery = station.taken
+    return commands, station, disk
+
+
+def test_nothing_begins_by_a_reset_that_waited_for_the_disk_while_a_person_stopped_the_station():
+    """The reset's write ends first, and the stop's is still to come."""
+
+    async def main():
+        commands, station, disk = resetting(State.STOPPED)
+        started = asyncio.create_task(commands._reset(("anna", "operator")))
+        assert await asyncio.to_thread(disk.begun[0].wait, 30)
+        stopping = asyncio.create_task(commands.stop())
+        await asyncio.sleep(0)
+        disk.free[0].set()
+        assert await started == messages.STOPPED_MEANWHILE()
+        assert station.posted == []
+        disk.free[1].set()
+        assert await stopping is None
+        assert station.stopped_by_person
+
+    asyncio.run(main())
+
+
+def emergency_stop(station: Station, devices: Any) -> None:
+    devices.active_stop = ArmFault(ArmCause.EMERGENCY_STOP, EMERGENCY_STOP())
+
+
+def released_emergency_stop(station: Station, devices: Any) -> None:
+    station.state, station.entered_s = State.LATCHED, time.monotonic()
+
+
+def stop_on_the_pendant(station: Station, devices: Any) -> None:
+    devices.program_stopped = True
+
+
+@pytest.mark.parametrize("happens", [emergency_stop, released_emergency_stop, stop_on_the_pendant])
+def test_a_reset_confirms_no_stop_that_came_while_it_waited_for_the_disk(happens):
+    async def main():
+        commands, station, disk = resetting(State.LATCHED)
+        started = asyncio.create_task(commands._reset(("anna", "operator")))
+        assert await asyncio.to_thread(disk.begun[0].wait, 30)
+        happens(station, commands._devices)
+        disk.free[0].set()
+        assert await started is not None
+        assert station.posted == []
+
+    asyncio.run(main())
+
+
+def test_a_reset_goes_by_the_state_that_the_station_came_to_while_it_waited_for_the_disk():
+    """A device came back: the station is stopped by now, and nothing but this reset leads on."""
+
+    async def main():
+        commands, station, disk = resetting(State.HELD)
+        started = asyncio.create_task(commands._reset(("anna", "operator")))
+        assert await asyncio.to_thread(disk.begun[0].wait, 30)
+        station.state, station.entered_s = State.STOPPED, time.monotonic()
+        disk.free[0].set()
+        assert await started is None
+        assert station.posted == [Event.RESET]
+
+    asyncio.run(main())
