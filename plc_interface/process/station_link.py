@@ -35,6 +35,8 @@ OUTCOME_GRACE_S = 1.0
 _NOTE_TRIES = 3
 """A note that was refused may have been spoilt on its way; the station takes the same note again without effect."""
 _NOTE_AGAIN_S = 0.25
+_NOTE_LATER_S = 10.0
+"""Notes that were refused as often are repeated after so long each: the station's records cannot be written."""
 _ASK_AGAIN_S = 2.0
 """An outcome is asked for again after so long without an answer; the station answers every one who waits."""
 
@@ -57,6 +59,9 @@ class StationLink:
         self._client = ChannelClient(endpoint, "the station")
         self._notes: deque[do.NotifyPublished | do.NotifyAcknowledged] = deque()
         self._noting: asyncio.Task[None] | None = None
+        self._refused: dict[do.NotifyPublished | do.NotifyAcknowledged, None] = {}
+        """Notes that the station did not take, in their order."""
+        self._repeating: asyncio.Task[None] | None = None
         self._outcomes: dict[int, asyncio.Task[None]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._beat_now = asyncio.Event()
@@ -188,17 +193,36 @@ class StationLink:
             try:
                 await self._client.request(request, Noted, deadline_s=self._settings.station_lost_after_s)
             except RefusedError as error:
-                log.warning("the station did not take a note: %s", error)
-                refused += 1
-                if refused < _NOTE_TRIES:
-                    await asyncio.sleep(_NOTE_AGAIN_S)
-                    continue
+                if action not in self._refused:
+                    log.warning("the station did not take a note: %s", error)
+                    refused += 1
+                    if refused < _NOTE_TRIES:
+                        await asyncio.sleep(_NOTE_AGAIN_S)
+                        continue
+                    self._repeat_later(action)
             except ChannelError as error:
                 self._notes.clear()  # resynchronisation publishes final outcomes again
+                self._refused.clear()
                 self._feed(ev.RequestFailed(now(), str(error)))
                 return
             else:
+                self._refused.pop(action, None)
                 if published:
                     self._feed(ev.OutcomeNoted(now(), action.outcome.sequence))
             refused = 0
             self._notes.popleft()
+
+    def _repeat_later(self, action: do.NotifyPublished | do.NotifyAcknowledged) -> None:
+        """Repeat a refused note until the station takes it: till then its record may have another outcome than the PLC.
+
+        No resynchronisation need come before the station's next start, which would find the outcome unpublished.
+        """
+        self._refused[action] = None
+        if self._repeating is None or self._repeating.done():
+            self._repeating = self._spawn(self._repeat(), "refused notes")
+
+    async def _repeat(self) -> None:
+        while self._refused:
+            await asyncio.sleep(_NOTE_LATER_S)
+            for action in self._refused:
+                self.carry_out(action)
