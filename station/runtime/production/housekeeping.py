@@ -26,6 +26,9 @@ _BOOK_EVERY_S = 2.0
 _DAMAGE_EVERY_S = 10.0
 _MEMORY_EVERY_S = 60.0
 """Images leave memory free between lasting objects, which is returned so often at most: an estimate, docs/soak.md."""
+_LONGEST_RECOVERY_S = 300.0
+"""A recovery that takes longer counts as stuck, as one of records on a disk that hangs, and the process is started
+again. An estimate: the arm's program takes up to `arm.recovery_deadline_s`, a large database longer than any device."""
 _CLOCK_STEP_S = 2.0
 _RECIPE_WITHIN_S = 10.0
 """The line's time to choose a recipe, before its absence is an alarm."""
@@ -67,11 +70,21 @@ class Housekeeping:
         self._clock_offset_s = time.time() - time.monotonic()
         self._pause_s, self._again_s = PERIOD_S, 0.0
         self._restarts_counted: dict[str, int] = {}
+        self._recovery: asyncio.Task[None] | None = None
+        self._recovery_began_s = 0.0
 
     async def run(self) -> None:
         """Run until cancelled."""
+        try:
+            await self._run()
+        finally:
+            if self._recovery is not None:
+                self._recovery.cancel()
+                await asyncio.gather(self._recovery, return_exceptions=True)
+
+    async def _run(self) -> None:
         while True:
-            if self._service.state in _AWAY:
+            if self._recovery is not None or self._service.state in _AWAY:
                 await self._recover()
             else:
                 self._pause_s, self._again_s = PERIOD_S, 0.0
@@ -87,7 +100,8 @@ class Housekeeping:
                 self._memory_at_s = time.monotonic()
                 return_freed_memory()
             self._metrics.ready(ready=self._interlock.refusal()[0] is None)
-            self._liveness.progress(UPKEEP)
+            if self._recovery is None or time.monotonic() - self._recovery_began_s < _LONGEST_RECOVERY_S:
+                self._liveness.progress(UPKEEP)
             await asyncio.sleep(PERIOD_S)
 
     async def _refresh_recipes(self) -> None:
@@ -97,8 +111,16 @@ class Housekeeping:
         self._audit.log(*self._recipes.take_noticed())
 
     async def _recover(self) -> None:
+        """Recover what is faulty, beside the rounds: without their progress the arm's program would be stopped."""
         service = self._service
-        await self._try_recovery()
+        if self._recovery is None:
+            self._recovery = asyncio.create_task(self._try_recovery(), name="recovery")
+            self._recovery_began_s = time.monotonic()
+        done, _ = await asyncio.wait({self._recovery}, timeout=PERIOD_S)
+        if not done:
+            return
+        recovery, self._recovery = self._recovery, None
+        recovery.result()
         entered_s = service.runner.entered_s
         if (
             service.registry.fault is None

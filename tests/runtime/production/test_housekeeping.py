@@ -1,11 +1,17 @@
 """What is done beside the cycle, and when."""
 
 import asyncio
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from station.inspection.states import State
+from station.runtime.devices.manager import GRIPPER
+from station.runtime.observability.health import Liveness
 from station.runtime.production import housekeeping
+from station.runtime.production.housekeeping import UPKEEP, Housekeeping
+from station.settings.configuration import Configuration
 
 RETREAT = {State.RETREATING, State.RETREATING_READY, State.RETREATING_ACCEPTED}
 
@@ -41,3 +47,58 @@ def test_freed_memory_and_damage_are_seen_to_between_inspections_also_at_full_pa
     for states in map(set, seen):
         assert states <= {State.IDLE, *RETREAT}
         assert states & RETREAT, "a line at full pace leaves no idle station"
+
+
+class SlowRecords:
+    """Records with a fault, whose opening begins and does not end."""
+
+    def __init__(self) -> None:
+        self.fault, self.records, self.opening = True, SimpleNamespace(notices=()), asyncio.Event()
+
+    async def reopen(self, **_: object) -> None:
+        self.opening.set()
+        await asyncio.Event().wait()
+
+
+def housekeeping_of(records: SlowRecords, liveness: Liveness, on_round: Any, home: Any) -> Housekeeping:
+    """Make the housekeeping of a held station without any other fault; it calls a function at each round's end."""
+    service = SimpleNamespace(state=State.HELD, makes_itself_ready=False, registry=records)
+    gripper = SimpleNamespace(fault=None)
+    devices = SimpleNamespace(monitors={GRIPPER: gripper}, faults={}, needs_program_restart=False)
+    nothing: Any = None
+    production: Any = SimpleNamespace(
+        service=service, devices=devices, plc_commands=nothing, recipes=nothing,
+        interlock=SimpleNamespace(refusal=lambda: (None, None)),
+    )  # fmt: skip
+    seen: Any = SimpleNamespace(metrics=SimpleNamespace(ready=on_round), liveness=liveness, audit=nothing)
+    return Housekeeping(Configuration(home=home), production, seen, {}, None)
+
+
+@pytest.mark.parametrize("longest_s", [None, 0.0])
+def test_a_slow_recovery_is_progress_until_its_own_limit(tmp_path, monkeypatch, longest_s):
+    """Without it the PLC's heartbeat and the arm's program would stop, and the process be ended."""
+    monkeypatch.setattr(housekeeping, "PERIOD_S", 0.01)
+    for period in ("_ALARMS_EVERY_S", "_BOOK_EVERY_S"):
+        monkeypatch.setattr(housekeeping, period, float("inf"))
+    if longest_s is not None:
+        monkeypatch.setattr(housekeeping, "_LONGEST_RECOVERY_S", longest_s)
+    now_s, progress_s = 0.0, Configuration(home=tmp_path).service.progress_s
+
+    async def main():
+        nonlocal now_s
+        liveness, records, rounds = Liveness(lambda: now_s), SlowRecords(), asyncio.Semaphore(0)
+        liveness.watch(UPKEEP, progress_s)
+        upkeep = housekeeping_of(records, liveness, lambda **_: rounds.release(), tmp_path)
+        running = asyncio.create_task(upkeep.run())
+        async with asyncio.timeout(30):
+            await records.opening.wait()
+            for _ in range(4):
+                now_s += 0.75 * progress_s
+                for _ in range(2):  # the round that was under way, and a whole one
+                    await rounds.acquire()
+        assert set(liveness.stuck()) == (set() if longest_s is None else {UPKEEP})
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+        assert len(asyncio.all_tasks()) == 1, "the recovery has ended too"
+
+    asyncio.run(main())
