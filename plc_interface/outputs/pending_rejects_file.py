@@ -35,8 +35,12 @@ class PendingRejectFile:
         return {sequence: count for sequence, count in counts.items() if 1 <= sequence < _RANGE and 0 <= count < _RANGE}
 
     def write(self, counts: Mapping[int, int]) -> None:
-        """Replace the file by counts as `read` returns them. A failure is logged: the line goes on."""
+        """Replace the file by counts as `read` returns them. A failure is logged: the line goes on.
+
+        It only has to outlive the process, and does not wait for the disk, which may take longer than the PLC or the
+        station waits for this process: after a loss of power the fruit have passed the gate.
+        """
         try:
-            write_atomically(self._path, json.dumps(counts).encode())
+            write_atomically(self._path, json.dumps(counts).encode(), durable=False)
         except OSError as error:
             log.error("the shots cannot be written to %s: %s", self._path, error.strerror)  # noqa: TRY400

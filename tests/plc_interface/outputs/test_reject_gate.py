@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from plc_interface.outputs.line_output import NoOutput, RejectGate, make_output
+from plc_interface.outputs.pending_rejects_file import PendingRejectFile
 from station.channel.line import Outcome
 from station.messages import can as messages
 from station.settings.can import CanSettings
@@ -35,7 +36,7 @@ def gated(on_bus, tmp_path):
                 await rig.until(lambda: rig.gate.ready)
                 await rig.until(lambda: rig.gate.encoder_count() == rig.nodes.encoder.count)
 
-            rig.restart = start
+            rig.restart, rig.folder = start, tmp_path
             await start()
             try:
                 await scenario(rig)
@@ -103,6 +104,18 @@ def test_the_twins_gate_lets_a_simulated_pass_go_on(tmp_path, bus):
         await gate.stop()
 
     asyncio.run(scenario())
+
+
+def test_no_shot_waits_for_the_disk_where_the_plc_waits_for_the_interface(gated, monkeypatch):
+    async def scenario(rig):
+        monkeypatch.setattr("os.fsync", lambda _: pytest.fail("the loop of the PLC's replies waits for the disk"))
+        rig.gate.publish(outcome(1, "FAIL", rig.gate.encoder_count()))
+        assert set(PendingRejectFile(rig.folder).read()) == {1}, "a kill loses no shot"
+        await armed(rig, 1)
+        rig.run_belt()
+        await rig.until(lambda: not rig.gate._due)
+
+    gated(scenario)
 
 
 def test_an_outcome_that_comes_again_is_one_shot(gated):
