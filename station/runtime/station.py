@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import logging
 import uuid
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -120,7 +120,7 @@ class Station:
         await asyncio.to_thread(book.read)
         lots = LotManager(service, book, audit, kept)
         await asyncio.to_thread(lots.restore)
-        audit.log(*start_entries(self.boot, configuration, kept, versions, self._broken))
+        self._note_start(audit, kept, versions)
         orders = PlcCommands(service, devices, book, lots, kept, observability)
         orders.restore()
         interlock = Interlock(service, devices, orders, book, lots, observability)
@@ -175,6 +175,10 @@ class Station:
         for name in names:
             liveness.watch(name, self._configuration.service.progress_s)
         self._begin(stack, feed_watchdog(lambda: liveness.stuck().keys().isdisjoint({CYCLE, UPKEEP})), "watchdog")
+
+    def _note_start(self, audit: AuditLogger, kept: StateFiles, versions: Mapping[str, str]) -> None:
+        entries, confirm = start_entries(self.boot, self._configuration, kept, versions, self._broken)
+        audit.log(*entries, on_stored=partial(asyncio.to_thread, confirm))
 
     async def _note_end(self, audit: AuditLogger) -> None:
         """Write the last audit entry of this start, if it can be written in time."""

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+from collections.abc import Awaitable, Callable
 from typing import Any, Literal, TypeAlias
 
 from station.channel.line import Command, CommandDone
@@ -32,10 +33,13 @@ class AuditLogger:
         """Entry that the records are writing: it goes on when its waiter is cancelled, and is never written again."""
         self._queued = asyncio.Event()
         self._writing = asyncio.Lock()
+        self._on_stored: list[tuple[AuditEntry, Callable[[], Awaitable[object]]]] = []
 
-    def log(self, *entries: AuditEntry) -> None:
-        """Queue entries to be written."""
+    def log(self, *entries: AuditEntry, on_stored: Callable[[], Awaitable[object]] | None = None) -> None:
+        """Queue entries to be written; `on_stored` is called once the trail has the last of them."""
         self._waiting += entries
+        if on_stored is not None:
+            self._on_stored.append((entries[-1], on_stored))
         while len(self._waiting) > MOST_WAITING:
             log.error("the audit trail loses its oldest unwritten row: %s", self._waiting.pop(0))
         self._queued.set()
@@ -89,8 +93,15 @@ class AuditLogger:
                     self._waiting.insert(0, entry)
                     self._under_way = None
                     return False
+                else:
+                    await self._report_stored(entry)
                 self._under_way = None
             return True
+
+    async def _report_stored(self, entry: AuditEntry) -> None:
+        for waiting in [each for each in self._on_stored if each[0] is entry]:
+            await waiting[1]()
+            self._on_stored.remove(waiting)
 
 
 def command_entry(command: Command, done: CommandDone, old: Any, by: tuple[str, str]) -> AuditEntry:

@@ -4,7 +4,7 @@ import hashlib
 import hmac
 import json
 import secrets
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from station.records.audit import STATION, AuditEntry
@@ -19,11 +19,15 @@ _HIDDEN = ("password", "secret", "token", "pin")
 
 def start_entries(
     boot: str, configuration: Configuration, state_files: StateFiles, versions: Mapping[str, str], broken: str
-) -> tuple[AuditEntry, ...]:
-    """Make the entries of a start, with the settings that changed since the last start, which the state files have.
+) -> tuple[tuple[AuditEntry, ...], Callable[[], bool]]:
+    """Make the entries of a start, with the settings that changed since the last audited ones in the state files.
 
     Args:
         broken: error of the configuration's file; its last good form is in force then.
+
+    Returns:
+        The entries, and a function that makes these settings the last audited ones; call it once the audit trail has
+        the entries, or a change would be in no trail where this start cannot write it.
     """
     key = state_files.read(_KEY)
     if not key:
@@ -31,15 +35,19 @@ def start_entries(
     values = dict(_flat(configuration.model_dump(mode="json"), "", key))
     text = json.dumps(values, sort_keys=True)
     before = json.loads(state_files.read(_LAST) or b"null")
-    state_files.write(_LAST, text.encode())
     sha256 = hashlib.sha256(text.encode()).hexdigest()
     told = {"boot": boot, "configuration_sha256": sha256, **versions} | ({"broken": broken} if broken else {})
     start = AuditEntry(STATION, STATION, "service.started", "station", "", None, told)
+
+    def confirm() -> bool:
+        return state_files.write(_LAST, text.encode())
+
     if not isinstance(before, dict) or before == values:
-        return (start,)
+        return (start,), confirm
     changed = sorted(name for name in {*before, *values} if before.get(name) != values.get(name))
     old, new = ({name: each.get(name) for name in changed} for each in (before, values))
-    return start, AuditEntry("configuration", STATION, "settings.changed", "station.yaml or environment", "", old, new)
+    change = AuditEntry("configuration", STATION, "settings.changed", "station.yaml or environment", "", old, new)
+    return (start, change), confirm
 
 
 def end_entry(boot: str, *, requested: bool) -> AuditEntry:
