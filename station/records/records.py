@@ -276,14 +276,15 @@ class Records:
         """Store that the PLC was given an outcome; it overrides the judgement. The first one remains: idempotent.
 
         An inspection that this database does not know, as one begun before a damaged database was moved aside, is
-        recorded from the outcome itself. True for the first time, so that it is counted once.
+        recorded from the outcome itself. True for the first time, so that it is counted once: without a deadline, as
+        the answer to a slow write would be lost, and that to its repetition is False.
 
         Raises:
             UnknownInspectionError: no such sequence was ever given.
             RecordsError: it may not be durable.
         """
         mark = self._get().mark
-        return await self._ask(lambda connection: publish(connection, outcome, mark.value, self._boot))
+        return await self.change_to_end(lambda connection: publish(connection, outcome, mark.value, self._boot))
 
     async def acknowledged(self, sequence: int) -> int:
         """Store that the PLC has taken every outcome up to this sequence, and count the new ones. Idempotent.

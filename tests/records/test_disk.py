@@ -224,6 +224,23 @@ def test_a_begin_that_came_too_late_is_withdrawn(opened, scenario, trigger):
     scenario(steps)
 
 
+def test_a_published_outcome_whose_write_outlasts_the_deadline_is_counted_once(opened, scenario, trigger, passed):
+    async def steps():
+        async with opened(deadline_s=0.2) as records:
+            outcome = await records.conclude(await records.begin(trigger), passed)
+            gate = threading.Event()
+            waiting = asyncio.create_task(_run_in_writer(records, lambda _: gate.wait(30)))
+            await asyncio.sleep(0)
+            published = [asyncio.create_task(records.published(outcome)) for _ in range(2)]
+            with pytest.raises(RecordsDeadlineError):
+                await records.open_inspections()  # which comes after them
+            gate.set()
+            await waiting
+            assert await asyncio.gather(*published) == [True, False]
+
+    scenario(steps)
+
+
 def test_a_begin_withdrawn_while_the_records_close_is_withdrawn(opened, scenario, trigger, monkeypatch):
     """Its answer comes when the writer takes nothing more from outside."""
     gate = threading.Event()
