@@ -206,6 +206,7 @@ class Station:
         limit_s = self._configuration.service.clean_up_deadline_s
         try:
             async with asyncio.timeout(limit_s):
+                await service.end_manual()  # its arm leaves only while the cycle renews its lease
                 await service.runner.until(lambda state: STATES[state].may_exit)
         except TimeoutError:
             log.warning("ended after %g s in the middle of: %s", limit_s, STATES[service.state].activity)

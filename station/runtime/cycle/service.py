@@ -297,7 +297,9 @@ class Service:
         if not self._liveness.stuck():
             self._devices.renew_health(_LEASE_S)
         self._report_late()
-        if self.ending and self.state in {State.IDLE, *UNJUDGED} and self._late_in is None:
+        # A HALT would stop what an activity at the panel still moves: its jaws that open, and the arm that leaves.
+        moves_by_hand = self.manual_activity is not None
+        if self.ending and not moves_by_hand and self.state in {State.IDLE, *UNJUDGED} and self._late_in is None:
             self._late_in = self.state
             self.runner.post(Event.STOP, messages.STATION_ENDS())
 

@@ -16,7 +16,8 @@ from station.messages.commands import JOGGING
 from station.messages.gripper import REMEDY_STOPPED, STOPPED
 from station.messages.maintenance import UNDER_WAY
 from station.press.reference import are_open
-from station.runtime.devices.manager import CAMERA, GRIPPER
+from station.runtime.devices.calibration_rig import CalibrationRig
+from station.runtime.devices.manager import CAMERA, GRIPPER, DeviceManager
 from station.runtime.production.plc_commands import MANUAL
 from station.state_files import StateFiles
 from tests.runtime.ball import MAX, end_run, give, run_now, start_run, stop, until_waits
@@ -206,3 +207,48 @@ def test_a_persons_stop_ends_a_jog(at_ball):
             assert ended.value.message == GripperStoppedError(STOPPED(), REMEDY_STOPPED()).message
 
     asyncio.run(scenario())
+
+
+@pytest.mark.timeout(500)
+@pytest.mark.parametrize("stopped", [False, True])
+def test_an_orderly_end_keeps_the_arm_alive_until_the_ball_is_released_and_the_arm_at_home(
+    at_ball, monkeypatch, stopped
+):
+    release, close, left = CalibrationRig.release, DeviceManager.close, list[tuple[str | None, object]]()
+
+    async def closed(self):
+        state = await self._arm.state()
+        left.append((state.at, state.fault))
+        await close(self)
+
+    async def scenario():
+        monkeypatch.setattr(DeviceManager, "close", closed)
+        async with at_ball(bench=False) as (cell, panel, entered):
+            devices, renewals = cell.station.service._devices, list[float]()
+            renew = devices.renew_health
+
+            def renewed(lease_s):
+                renewals.append(lease_s)
+                renew(lease_s)
+
+            async def released(self, failed=None):
+                await release(self, failed)
+                renewals.clear()
+                await cell.until(lambda: renewals, patience_s=15)
+
+            if stopped:
+                await stop(panel)
+            await start_run(panel)
+
+            async def pressed():
+                return any(step.title == STEP_PRESS() for step in (await run_now(panel)).steps)
+
+            await cell.until(pressed)
+            monkeypatch.setattr(devices, "renew_health", renewed)
+            monkeypatch.setattr(CalibrationRig, "release", released)
+            cell.station.stop()
+            await cell.running
+            assert State.LATCHED not in entered
+
+    asyncio.run(scenario())
+    assert left == [("home", None)]
