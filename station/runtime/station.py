@@ -141,11 +141,13 @@ class Station:
             },
             verbatim(self._broken) if self._broken else None,
         )
-        endpoint = _with_folder(line_endpoint(configuration.handshake, configuration.home))
-        line = PlcInterfaceServer(endpoint, production, alarm_orders)
+        await panel.restore()  # before the PLC interface publishes another outcome of one of these fruit
+        line = PlcInterfaceServer(
+            _with_folder(line_endpoint(configuration.handshake, configuration.home)), production, alarm_orders
+        )
         tasks = [self._begin(stack, line.serve(), "line server")]
         pages = PanelPages(configuration, records, production, observability)
-        await self._serve(stack, panel, pages)
+        self._serve(stack, panel, pages)
         port = await health.start()
         stack.push_async_callback(health.close)
         await self._open_devices(stack, devices, pages, alarms)
@@ -165,8 +167,7 @@ class Station:
         await stack.enter_async_context(pages)
         await devices.open()
 
-    async def _serve(self, stack: contextlib.AsyncExitStack, panel: PanelServer, pages: PanelPages) -> None:
-        await panel.restore()
+    def _serve(self, stack: contextlib.AsyncExitStack, panel: PanelServer, pages: PanelPages) -> None:
         stack.push_async_callback(panel.close)
         endpoint = _with_folder(panel_endpoint(self._configuration.hmi, self._configuration.home))
         self._begin(stack, ChannelServer(endpoint, {**panel.handlers, **pages.handlers}).serve(), "panel server")

@@ -35,7 +35,8 @@ def test_it_is_the_triggers_also_after_a_start(opened, scenario, trigger, passed
     standing = scenario(steps)
     assert (standing.outcome, standing.lot, trigger.lot) == ("NO_RESULT", "", LOT)
     now: Any = SimpleNamespace(
-        standing=standing, trigger=trigger, record=lambda: record, seen=[], limits=SimpleNamespace(inspection_s=15.0),
+        standing=standing, published=None, trigger=trigger, record=lambda: record, seen=[],
+        limits=SimpleNamespace(inspection_s=15.0),
         active=SimpleNamespace(recipe=find_recipe("strawberry"), snapshot=trigger.recipe),
     )  # fmt: skip
 

@@ -93,10 +93,10 @@ class RecentInspections:
         await asyncio.gather(*self._reading, return_exceptions=True)
 
     def add(self, now: Inspection) -> None:
-        """Add an inspection with its durable outcome."""
+        """Add an inspection with its durable outcome, or that which the PLC was given before it was durable."""
         if now.standing is None:
             return
-        fruit, look = _new_fruit(now, now.standing)
+        fruit, look = _new_fruit(now, now.published or now.standing)
         self._by_sequence[fruit.short.sequence] = _Recent(fruit, look)
         while len(self._by_sequence) > MOST_IN_FULL:
             self._by_sequence.popitem(last=False)

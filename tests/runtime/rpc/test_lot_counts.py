@@ -93,7 +93,7 @@ def test_a_lot_in_use_stays_in_memory_and_one_that_left_it_is_read_again_while_i
 
         def inspect(lot):
             stored.append(PASSED.model_copy(update={"sequence": len(stored) + 1, "lot": lot}))
-            now: Any = SimpleNamespace(standing=stored[-1])
+            now: Any = SimpleNamespace(standing=stored[-1], published=None)
             inspections.add(now)
 
         async def all_read():
