@@ -49,6 +49,10 @@ class Controller:
                 await self.scan(**inputs)
 
 
+def outcome_of(controller):
+    return BY_NAME["result_outcome"].codes[controller.block["result"]["outcome"]].name
+
+
 @pytest.mark.timeout(300)
 def test_three_fruits_by_the_shipped_program_and_one_that_a_simulated_station_may_not_let_pass(
     bench, plc_port, settings_file
@@ -69,8 +73,11 @@ def test_three_fruits_by_the_shipped_program_and_one_that_a_simulated_station_ma
                 result = controller.block["result"]
                 assert (controller.block["refused"], controller.block["timed_out"]) == (False, False)
                 assert (result["trigger_id"], result["encoder"]) == (number, number << 16)
-                passed = BY_NAME["result_outcome"].codes[result["outcome"]].name == "PASS"
-                assert controller.program["let_pass"] == passed
+                assert outcome_of(controller) == "PASS"
+                assert controller.program["let_pass"]
+                await controller.until("may_move", is_so=True, fruit_in_place=True)
+                assert controller.program["move_fruit"]
+                assert cell.twin.world.opening_mm() == pytest.approx(85, abs=1), "the line moves the fruit now"
                 await controller.until("done", is_so=False, fruit_in_place=False)
             client.close()
 
@@ -79,7 +86,7 @@ def test_three_fruits_by_the_shipped_program_and_one_that_a_simulated_station_ma
             controller = Controller(shipped, strict)
             await controller.until("ready", is_so=True, fruit_in_place=False)
             await controller.until("done", is_so=True, fruit_in_place=True)
-            assert controller.block["result"]["simulated"]
+            assert (outcome_of(controller), controller.block["result"]["simulated"]) == ("PASS", True)
             assert not controller.program["let_pass"]
             strict.close()
 
