@@ -1,12 +1,15 @@
 """What is done beside the cycle, and when."""
 
 import asyncio
+import time
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from station.inspection.alarm_table import AlarmId
 from station.inspection.states import State
+from station.messages.operation import CLOCK_BACK, CLOCK_FORWARD
 from station.runtime.devices.manager import GRIPPER
 from station.runtime.observability.health import Liveness
 from station.runtime.production import housekeeping
@@ -102,3 +105,21 @@ def test_a_slow_recovery_is_progress_until_its_own_limit(tmp_path, monkeypatch, 
         assert len(asyncio.all_tasks()) == 1, "the recovery has ended too"
 
     asyncio.run(main())
+
+
+@pytest.mark.parametrize(("step_s", "detail"), [(3600.0, CLOCK_FORWARD), (-3600.0, CLOCK_BACK), (1.0, None)])
+def test_a_step_of_the_clock_is_an_alarm_once(monkeypatch, step_s, detail):
+    raised = {}
+    keeping = Housekeeping.__new__(Housekeeping)
+    keeping._service = SimpleNamespace(
+        alarms=SimpleNamespace(raise_=raised.__setitem__, clear=lambda alarm: raised.pop(alarm, None))
+    )
+    keeping._clock_offset_s = time.time() - time.monotonic()
+    utc_s = time.time
+    monkeypatch.setattr(housekeeping.time, "time", lambda: utc_s() + step_s)
+    keeping._check_clock()
+    assert {alarm: message.id for alarm, message in raised.items()} == (
+        {AlarmId.CLOCK_STEPPED: detail.id} if detail else {}
+    )
+    keeping._check_clock()
+    assert raised == {}

@@ -13,8 +13,9 @@ from station.inspection.alarms import AlarmState
 from station.messages.can import UNORDERED_REPORT
 from station.messages.line import JOURNAL_NOT_WRITTEN
 from station.messages.message import verbatim
+from station.messages.operation import INTERFACE_SILENT
 from station.runtime.alarms.manager import AlarmManager
-from station.runtime.production.plc_commands import PlcCommands
+from station.runtime.production.plc_commands import LINE_SILENT_S, PlcCommands
 from station.runtime.rpc import maintenance
 from station.runtime.rpc.maintenance import PanelMaintenance
 
@@ -93,6 +94,19 @@ def test_a_failed_reject_that_is_reported_again_is_announced_once(alarms, beat):
 
 def test_a_fault_of_the_handshake_is_the_plcs_and_no_alarm(alarms, beat):
     beat(LineFault(part="handshake", what=verbatim("the PLC did not reset its trigger bit")))
+    assert active(alarms) == {}
+
+
+def test_an_interface_that_is_silent_is_an_alarm_of_its_own_and_not_the_plcs(alarms, commands, beat):
+    commands.update_line_alarms()
+    assert active(alarms) == {}, "one that has never beaten may not be there yet"
+    beat()
+    assert active(alarms) == {}
+    commands._line_at_s -= LINE_SILENT_S + 1
+    commands.update_line_alarms()
+    (alarm,) = alarms.alarms.active
+    assert (alarm.id, alarm.detail.id) == (AlarmId.PLC_INTERFACE_LOST, INTERFACE_SILENT.id)
+    beat()
     assert active(alarms) == {}
 
 
