@@ -20,10 +20,6 @@ from station.inspection.alarms import (
 )
 from station.inspection.cycle import TABLE, Raise
 from station.messages.message import verbatim
-from station.twin.digit.server import digit_faults
-from station.twin.robotiq.faults import gripper_faults
-from station.twin.ur.controller import arm_faults
-from tests.inspection.alarm_provocations import PROVOCATIONS
 
 LOW, STOP = AlarmId.DISK_LOW, AlarmId.PROTECTIVE_STOP
 
@@ -37,18 +33,9 @@ def test_every_alarm_asks_for_an_action_and_has_a_bit_of_its_own():
         for text in map(str, (row.cause, row.consequence, row.action)):
             assert text[0].isupper(), alarm
             assert text.endswith("."), alarm
-        assert PROVOCATIONS[alarm]
     counts = [sum(row.priority == priority for row in ALARMS.values()) for priority in Priority]
     assert counts[0] <= 3
     assert counts[0] + counts[1] <= len(ALARMS) / 3
-
-
-def test_what_provokes_an_alarm_is_a_fault_that_the_twin_has():
-    boards = {board.device: board.known for board in (arm_faults(), gripper_faults(), digit_faults())}
-    named = {provocation for provocations in PROVOCATIONS.values() for provocation in provocations}
-    assert {device for device, _ in named} <= {*boards, "nest", "line", "can", "process", "disk", "files", "clock"}
-    for device, fault in named:
-        assert device not in boards or fault in boards[device], (device, fault)
 
 
 def test_the_cycle_raises_alarms_that_a_person_must_end_only_where_one_is_needed():
