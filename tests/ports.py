@@ -7,12 +7,13 @@ import secrets
 import socket
 from collections.abc import Iterator
 
-_FIRST, _PORTS, _WORKERS = 10_000, 1_400, 16
+_WORKERS = max(16, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
+_FIRST, _PORTS = 10_000, 22_400 // _WORKERS
 """Below the ports of outgoing connections (on Linux from 32,768), any of which may take a port before it is bound."""
 
 
 def _own_ports() -> Iterator[int]:
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")) % _WORKERS
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
     first, begin = _FIRST + worker * _PORTS, secrets.randbelow(_PORTS)
     return itertools.cycle([first + (begin + place) % _PORTS for place in range(_PORTS)])
 
