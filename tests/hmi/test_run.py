@@ -119,7 +119,7 @@ def test_a_fruit_is_shown_with_its_curve_and_its_picture(ready, panel, eventuall
     outcome = ready.end(sequence)
     viewer.page.locator(f".fruit-more[href='/fruit/{sequence}']").wait_for()
     word = {"PASS": "i. O.", "FAIL": "n. i. O.", "NO_RESULT": "Kein Ergebnis"}[outcome.outcome]
-    assert word in viewer.text(".run-fruit .outcome")
+    assert viewer.text(".run-fruit .outcome b") == word
     if outcome.area_mm2 is not None:
         assert f"{outcome.area_mm2:.1f}".replace(".", ",") in viewer.text(".run-fruit .decided")
     picture = viewer.page.locator(".fruit-picture")
