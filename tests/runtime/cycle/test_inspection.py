@@ -53,7 +53,7 @@ def test_what_cannot_be_measured_is_no_result(bench):
             empty = await cell.line.inspect()
 
             cell.lay("blueberry")
-            assert (await cell.line.inspect()).outcome in {"PASS", "NO_RESULT", "FAIL"}
+            assert (await cell.line.inspect()).outcome == "PASS", "the one before leaves nothing behind"
             touching = replace(draw_fruit(Kind.STRAWBERRY, 1), width_mm=56.0)
             cell.twin.world.place(touching)
             in_contact = await cell.line.inspect()
