@@ -489,8 +489,12 @@ def play(plc, what, number, sequence):
             plc.wait(0.5 * number)
 
 
+PASSING = [("inspect", 1), ("accept", 1), ("show", 1)]
+
+
 @given(STEPS)
 @example([("inspect", 1), ("accept", 1), ("release", 1), ("inspect", 2), ("show", 1)])
+@example(PASSING)
 @settings(max_examples=30, deadline=None)
 def test_whatever_comes_only_the_asked_fruits_own_whole_result_passes(make_plc_for_examples, steps):
     plc = make_plc_for_examples()
@@ -509,5 +513,10 @@ def test_whatever_comes_only_the_asked_fruits_own_whole_result_passes(make_plc_f
             assert plc.inputs["inspect"]
             assert result["trigger_id"] == block["asked_id"]
             assert result["sequence"] == result["sequence_again"] != 0
+        if block["may_move"]:
+            assert block["alive"]
+            assert not block["busy"], "the arm may be on its way to the fruit"
         if not block["alive"]:
             assert all(zero(block[name]) for name in OUTPUTS)
+    if steps == PASSING:
+        assert (block["passed"], block["may_move"]) == (True, True), "what is asserted above is asserted of a fruit"
