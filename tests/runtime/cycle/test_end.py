@@ -1,0 +1,41 @@
+"""The end of the station's process while a fruit is inspected."""
+
+import asyncio
+import logging
+
+import pytest
+
+from station.inspection.cycle import Action
+from station.inspection.states import State
+from station.vocabulary import Reason
+
+
+@pytest.mark.timeout(240)
+def test_an_end_whose_clean_up_takes_longer_than_its_deadline_keeps_the_fruits_one_outcome(
+    bench, settings_file, caplog
+):
+    file = settings_file(clean_up_deadline_s=1.0)
+
+    async def scenario():
+        async def held(*_):
+            await asyncio.Event().wait()
+
+        async with bench(file) as cell:
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            begun = await cell.line.begin()
+            await cell.reach(State.CLOSING_TO_ONSET)
+            service = cell.station.service
+            service._of_station = {**service._of_station, Action.OPEN_JAWS: held, Action.GO_HOME: held}
+            service._of_inspection = {**service._of_inspection, Action.FREE_FRUIT: held}
+            cell.station.stop()
+            async with asyncio.timeout(15):
+                await asyncio.shield(cell.running)
+        async with bench(file) as cell:
+            return begun, (await cell.line.open()).outcomes
+
+    with caplog.at_level(logging.WARNING, "station.runtime.station"):
+        begun, outcomes = asyncio.run(scenario())
+    assert "ended after 1 s in the middle of" in caplog.text
+    assert [(each.sequence, each.outcome) for each in outcomes] == [(begun.sequence, "NO_RESULT")]
+    assert outcomes[0].reasons == (Reason.STATION_LOST,), "it was not stored in time: the next start does that"
