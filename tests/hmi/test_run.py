@@ -184,3 +184,19 @@ def test_what_stops_has_to_be_held_and_works_by_keyboard(ready, operator, eventu
     clock.run_for(2000)
     assert operator.page.evaluate("document.querySelectorAll('form[data-sent]').length") == 0
     assert ready.until(lambda _: True).ready, "a touch alone stops nothing"
+
+
+@pytest.mark.timeout(240)
+def test_what_stops_by_a_screen_reader_which_can_only_click_takes_two_clicks(ready, operator):
+    operator.open("/")
+    stop = operator.page.locator("#order-stop")
+    again = stop.get_attribute("data-again")
+    stop.evaluate("button => button.click()")
+    assert stop.inner_text() == again
+    assert operator.page.evaluate("document.querySelectorAll('form[data-sent]').length") == 0
+    assert ready.until(lambda _: True).ready, "one click stops nothing"
+    with operator.page.expect_navigation():
+        stop.evaluate("button => button.click()")
+    ready.until(lambda state: state.state == "stopped" and state.stopping)
+    follow(operator.page.get_by_role("button", name="Start"))
+    ready.until(lambda state: state.ready)
