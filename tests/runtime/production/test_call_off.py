@@ -14,9 +14,9 @@ from station.channel.panel_live import (
     OperatorCommandView,
     PanelState,
 )
+from station.inspection.cycle import Action
 from station.inspection.states import State
 from station.messages import commands
-from station.runtime.cycle.actions import Inspector
 from station.runtime.production.plc_commands import PlcCommands
 from station.settings.hmi import panel_endpoint
 from station.vocabulary import Reason
@@ -81,17 +81,21 @@ def test_a_call_off_does_not_wait_for_a_change_of_recipe_that_waits_for_the_frui
 
 @pytest.mark.timeout(240)
 def test_a_call_off_that_comes_with_the_judgement_is_not_done(bench, monkeypatch):
+    held_back = []
+
     async def scenario():
         async with bench() as cell:
             await cell.choose("strawberry")
-            runner, judge, judged = cell.station.service.runner, Inspector.judge, asyncio.Event()
+            service, judged = cell.station.service, asyncio.Event()
+            runner, actions = service.runner, service._of_inspection
 
-            async def held(self, now):
-                event = await judge(self, now)
+            async def held(now):
+                event = await actions[Action.JUDGE](now)
                 await judged.wait()
+                held_back.append(event)
                 return event
 
-            monkeypatch.setattr(Inspector, "judge", held)
+            service._of_inspection = {**actions, Action.JUDGE: held}
             inspected = asyncio.create_task(cell.line.inspect())
             await cell.reach(State.JUDGING)
             # The judgement's event is taken before the other, which then changes nothing.
@@ -99,5 +103,6 @@ def test_a_call_off_that_comes_with_the_judgement_is_not_done(bench, monkeypatch
             return await cell.line.order(CommandName.CALL_OFF), await inspected
 
     done, outcome = asyncio.run(scenario())
+    assert len(held_back) == 1
     assert (done.done, done.why) == (False, commands.JUDGED())
     assert Reason.CALLED_OFF not in outcome.reasons
