@@ -9,6 +9,7 @@ import pytest
 
 from station.inspection.alarm_table import AlarmId
 from station.inspection.states import State
+from station.messages.message import Message
 from station.messages.operation import CLOCK_BACK, CLOCK_FORWARD
 from station.runtime.devices.manager import GRIPPER
 from station.runtime.observability.health import Liveness
@@ -109,11 +110,11 @@ def test_a_slow_recovery_is_progress_until_its_own_limit(tmp_path, monkeypatch, 
 
 @pytest.mark.parametrize(("step_s", "detail"), [(3600.0, CLOCK_FORWARD), (-3600.0, CLOCK_BACK), (1.0, None)])
 def test_a_step_of_the_clock_is_an_alarm_once(monkeypatch, step_s, detail):
-    raised = {}
+    raised: dict[AlarmId, Message] = {}
+    alarms = SimpleNamespace(raise_=raised.__setitem__, clear=lambda alarm: raised.pop(alarm, None))
+    service: Any = SimpleNamespace(alarms=alarms)
     keeping = Housekeeping.__new__(Housekeeping)
-    keeping._service = SimpleNamespace(
-        alarms=SimpleNamespace(raise_=raised.__setitem__, clear=lambda alarm: raised.pop(alarm, None))
-    )
+    keeping._service = service
     keeping._clock_offset_s = time.time() - time.monotonic()
     utc_s = time.time
     monkeypatch.setattr(housekeeping.time, "time", lambda: utc_s() + step_s)
