@@ -71,7 +71,8 @@ def test_three_fruits_by_the_shipped_program_and_one_that_a_simulated_station_ma
                 await controller.until("ready", is_so=True, fruit_in_place=False)
                 await controller.until("done", is_so=True, fruit_in_place=True, line_encoder=number << 16)
                 result = controller.block["result"]
-                assert (controller.block["refused"], controller.block["timed_out"]) == (False, False)
+                ended = {name: controller.block[name] for name in ("refused", "refusal", "timed_out")}
+                assert ended == {"refused": False, "refusal": 0, "timed_out": False}
                 assert (result["trigger_id"], result["encoder"]) == (number, number << 16)
                 assert outcome_of(controller) == "PASS"
                 assert controller.program["let_pass"]
