@@ -293,8 +293,8 @@ CALIBRATION_OLD = AlarmTexts(
     ),
     define(
         "alarm.action.calibration_old",
-        "At the next pause stop the station and run `station verify`; where that fails, or there is no calibration, "
-        "`station calibrate`.",
+        "At the next pause verify with the ball: on the page Maintenance, Sensor, or with the station stopped by "
+        "`station verify`. Where that fails, or there is no calibration, calibrate.",
     ),
 )
 HMI_LOST = AlarmTexts(
