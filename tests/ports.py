@@ -7,7 +7,7 @@ import secrets
 import socket
 from collections.abc import Iterator
 
-_WORKERS = max(16, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
+_WORKERS = max(16, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")) + 4)
 _FIRST, _PORTS = 10_000, 22_400 // _WORKERS
 """Below the ports of outgoing connections (on Linux from 32,768), any of which may take a port before it is bound."""
 

@@ -154,7 +154,8 @@ class _World:
         self.clock.after(SCAN_S, self._scan)
         if self._devices.trouble("plc") == "pause":
             return
-        if self._program.free and self._fruits < self._wanted:
+        room = self._cell.fruit is None or self._leaves
+        if self._program.free and room and self._fruits < self._wanted:
             self._take_away()  # the next one pushes it out
             self._fruits += 1
             fruit = draw_fruit(self._fruits, self._rng)

@@ -109,7 +109,8 @@ class InspectionSummary(Model):
     trigger_id: int
     began: Moment = Field(validation_alias="began_utc_ms")
     duration_s: Annotated[float | None, BeforeValidator(lambda ms: None if ms is None else ms / 1000)] = Field(
-        validation_alias="duration_ms", description="Null while it runs, and where the station was lost."
+        validation_alias="duration_ms",
+        description="Null while it runs, and where it is not known: the station was killed.",
     )
     lot: str
     grower: str
@@ -147,7 +148,9 @@ class InspectionDetails(Model):
     encoder: int
     began: datetime
     ended: datetime | None
-    duration_s: float | None = Field(description="Null while it runs, and where the station was lost.")
+    duration_s: float | None = Field(
+        description="Null while it runs, and where it is not known: the station was killed."
+    )
     lot: str
     simulated: bool = Field(description="A twin's device took part.")
     outcome: OutcomeName | None = Field(

@@ -28,6 +28,8 @@ from station.channel.line import (
 )
 from station.channel.messages import ChannelError, DeadlineError, RefusedError
 from station.clock import utc_ms
+from station.messages.message import text_of
+from station.messages.records import NEVER_BEGUN
 from station.settings.plc import HandshakeSettings
 
 OUTCOME_GRACE_S = 1.0
@@ -184,7 +186,10 @@ class StationLink:
             self._feed(ev.CommandAnswered(now(), action.number, done.done, str(done.why or "")))
 
     async def _note(self) -> None:
-        """Send notes one after the other: an acknowledgement never overtakes its outcome."""
+        """Send notes one after the other, so that an acknowledgement overtakes its outcome only where that was refused.
+
+        The station then leaves it out, and the next acknowledgement, or the resynchronisation, covers it.
+        """
         refused = 0
         while self._notes:
             action = self._notes[0]
@@ -199,7 +204,8 @@ class StationLink:
                     if refused < _NOTE_TRIES:
                         await asyncio.sleep(_NOTE_AGAIN_S)
                         continue
-                    self._repeat_later(action)
+                    if NEVER_BEGUN.id not in text_of(error.message):  # no repetition helps
+                        self._repeat_later(action)
             except ChannelError as error:
                 self._notes.clear()  # resynchronisation publishes final outcomes again
                 self._refused.clear()
@@ -225,4 +231,5 @@ class StationLink:
         while self._refused:
             await asyncio.sleep(_NOTE_LATER_S)
             for action in self._refused:
-                self.carry_out(action)
+                if action not in self._notes:
+                    self.carry_out(action)

@@ -56,7 +56,7 @@ class Outcome(ChannelMessage):
     began_utc_ms: int = Field(ge=0, lt=2**63)
     ended_utc_ms: int = Field(ge=0, lt=2**63)
     duration_ms: int = Field(ge=0, lt=2**32)
-    """By the monotonic clock; 0 where it is not known, because the station was lost."""
+    """By the monotonic clock; 0 where it is not known, as of a station that was killed."""
     encoder: int = Field(ge=0, lt=2**32)
     """The line's encoder at the trigger, as given with `Begin`."""
     lot: str = Field(max_length=32)

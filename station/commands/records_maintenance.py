@@ -94,6 +94,7 @@ def hold(thing: str, *, is_lot: bool | None, reason: str, by: str, config: Path 
         held = place_hold(connection, meant, reason, by)
         if held not in before:
             append_audit(connection, AuditEntry(by, _ROLE, "images.held", held.description, reason))
+    with reading(folder_of(config)) as connection:
         stored = describe_stored(connection, meant)
     since = f"since {formatted(held.placed_utc_ms)}, by {held.by}: {held.reason}"
     click.echo(printable(f"the images of {held.description} are retained {since}"))

@@ -157,6 +157,10 @@ class Alarms:
         """A person has seen it."""
         return self._after(alarm, E.ACKNOWLEDGED)
 
+    def end(self, alarm: AlarmId) -> Self:
+        """Its cause is gone for good, also where it chattered."""
+        return self._with(_returned_for_good(self.get(alarm)))
+
     def acknowledge_returned(self) -> Self:
         """Acknowledge every alarm whose cause is gone: what the PLC's command does."""
         alarms = self

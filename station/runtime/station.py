@@ -205,9 +205,12 @@ class Station:
             return
         service.end()
         limit_s = self._configuration.service.clean_up_deadline_s
+        # Its arm leaves only while the cycle renews its lease.
+        by_hand = asyncio.create_task(service.end_manual(), name="end of what is moved by hand")
         try:
             async with asyncio.timeout(limit_s):
-                await service.end_manual()  # its arm leaves only while the cycle renews its lease
+                await asyncio.wait({by_hand})  # which can be left, where what it ends takes no cancellation
+                await by_hand
                 await service.runner.until(lambda state: STATES[state].may_exit)
         except TimeoutError:
             log.warning("ended after %g s in the middle of: %s", limit_s, STATES[service.state].activity)

@@ -132,7 +132,7 @@ class State:
 
 
 class RobustMethod:
-    """The robust measurement against one or several reference images.
+    """The robust measurement against a reference image.
 
     Args:
         reference: the untouched gel, shape (height, width, 3), dtype uint8, BGR; of several frames their median.
@@ -141,7 +141,7 @@ class RobustMethod:
         without: stages of `STAGES` to leave out.
 
     Raises:
-        ValueError: there is no reference, or one is not a colour image of the others' size.
+        ValueError: the reference is no such image, or there is no such stage.
     """
 
     stages: tuple[str, ...] = (

@@ -41,7 +41,7 @@ def test_a_page_that_shows_another_lot_ends_none(pages, station):
     async def ended(_change):
         """The lot of the records."""
 
-    station._records = SimpleNamespace(change=ended)
+    station._records = SimpleNamespace(change_to_end=ended)
 
     def start(lot: str) -> None:
         assert pages.post("/order", csrf=pages.token(), order="start_lot", argument=lot)[0] == 303

@@ -90,7 +90,7 @@ def test_an_outcome_that_came_too_late_is_late_in_every_output(opened, scenario,
 
 
 def test_one_fruit_has_one_duration_in_every_output(opened, scenario, trigger, passed, folder, ask, tmp_path):
-    """Of what the PLC received, also if the judgement followed; none where the station was lost."""
+    """Of what the PLC received, also if the judgement followed; none where nobody measured it."""
     late = {"outcome": "NO_RESULT", "reasons": (Reason.LATE,), "late": True, "area_mm2": None, "area_px": None}
 
     async def judged_and_late():

@@ -171,8 +171,9 @@ class AlarmManager:
     def acknowledge(self, alarm: AlarmId) -> bool:
         """Acknowledge an alarm, and return whether that changed anything."""
         changed = self._set(self.alarms.acknowledge(alarm), alarm, "acknowledged")
-        if changed and alarm in _OF_THE_PAST:
-            self.clear(alarm)
+        if changed and alarm in _OF_THE_PAST and self.alarms.get(alarm).state in CAUSED:
+            self._present.discard(alarm)
+            self._set(self.alarms.end(alarm), alarm, "cleared")
         return changed
 
     def shelve(self, alarm: AlarmId, for_s: float, by: str, reason: str) -> bool:

@@ -10,7 +10,7 @@ from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import CameraError
 from station.devices.gripper.errors import GripperEmergencyStopError, GripperError
 from station.errors import StationError
-from station.inspection.cycle import Act, Action, Cycle, Event, Raise
+from station.inspection.cycle import LATCHES, Act, Action, Cycle, Event, Raise
 from station.inspection.states import State
 from station.messages import operation as messages
 from station.messages.message import Message, message_of
@@ -100,6 +100,8 @@ class CycleRunner:
         self.cycle, self._hold = Cycle(hold), hold
         self.entered_s = time.monotonic()
         """When the present state was entered, monotonic."""
+        self.stopped_s = 0.0
+        """When the last event came that only a person may end, monotonic."""
         self._performer = performer
         self._events: asyncio.Queue[Happened] = asyncio.Queue()
         self._doing: dict[asyncio.Task[None], Action] = {}
@@ -168,6 +170,8 @@ class CycleRunner:
             log.warning("event %s is not expected in %s: %s", happened.event, before, happened.why or "no reason given")
             self._performer.refused(before, happened.event)
             return
+        if happened.event in LATCHES:
+            self.stopped_s = time.monotonic()
         if self.state is not before:
             now_s = time.monotonic()
             took_s, self.entered_s = now_s - self.entered_s, now_s

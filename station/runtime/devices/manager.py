@@ -76,7 +76,8 @@ class DeviceManager:
             or (arm is not None and configuration.arm.host.startswith("127."))
             or (configuration.gripper.driver == "urcap" and configuration.gripper.urcap.host.startswith("127."))
         )
-        self._light_by_hand = False
+        self.light_by_hand = False
+        """Whether the sensor's light may be another than the configuration's."""
         self._confirmed_clear = False
         self._recovery = asyncio.Lock()
         """Held while a lost activation is being restored, which may move the arm and moves the fingers."""
@@ -318,7 +319,7 @@ class DeviceManager:
         Raises:
             CameraError: the camera does not answer.
         """
-        self._light_by_hand = True
+        self.light_by_hand = True
         await self.cell.camera.set_leds(light)
 
     async def restore_light(self) -> None:
@@ -327,10 +328,15 @@ class DeviceManager:
         Raises:
             CameraError: the camera does not answer.
         """
-        if self._light_by_hand:
-            light = self._configuration.camera.digit
+        if not self.light_by_hand:
+            return
+        light = self._configuration.camera.digit
+        self.light_by_hand = False
+        try:
             await self.cell.camera.set_leds(Leds(light.red, light.green, light.blue))
-            self._light_by_hand = False
+        except BaseException:
+            self.light_by_hand = True
+            raise
 
     async def _check_camera(self) -> None:
         await self.cell.camera.open()

@@ -76,7 +76,7 @@ TABLE: dict[str, Row] = {
         "station_inspection_duration_seconds",
         "histogram",
         ("fruit",),
-        "From trigger to durable outcome; the buckets are shares of the inspection's deadline",
+        "From trigger to durable outcome, where it is known; the buckets are shares of the inspection's deadline",
     ),
     "phase": Row(
         "station_phase_duration_seconds", "histogram", ("phase",), "Time spent in one phase of the cycle", _PHASE_S

@@ -67,6 +67,7 @@ class OperatorCommands:
     ) -> None:
         self._plc_commands, self._service, self._devices, self._lots = plc_commands, service, devices, lots
         self._records, self._audit = records, audit
+        self._lot_turn = asyncio.Lock()
         self._tickets = itertools.count(1)
         self._recent: deque[OperatorCommandView] = deque(maxlen=_REMEMBERED)
         self._tasks: dict[int, asyncio.Task[None]] = {}
@@ -182,33 +183,35 @@ class OperatorCommands:
             return lots.PLC_NAMES()
         if not is_lot_name(name):
             return lots.BAD_NAME(name=name, longest=LONGEST_LOT)
-        before = self._lots.named
+        async with self._lot_turn:
+            before = self._lots.named
 
-        def register(connection: Connection) -> None:
-            if before != name:
-                _end_registered(connection, before, by)
-            known = grower or next((lot.grower for lot in read_lots(connection, 1, name=name)), "")
-            if known:
-                start_lot(connection, name, known, by)
+            def register(connection: Connection) -> None:
+                if before != name:
+                    _end_registered(connection, before, by)
+                known = grower or next((lot.grower for lot in read_lots(connection, 1, name=name)), "")
+                if known:
+                    start_lot(connection, name, known, by)
 
-        try:
-            await self._records.change(register)
-        except RecordsError as error:
-            return message_of(error)
-        return None if await self._lots.set_lot(name) else lots.START_NOT_STORED(lot=name)
+            try:
+                await self._records.change_to_end(register)
+            except RecordsError as error:
+                return message_of(error)
+            return None if await self._lots.set_lot(name) else lots.START_NOT_STORED(lot=name)
 
     async def _end_lot(self, name: str, by: tuple[str, str]) -> Message | None:
         if not self._lots.named:
             return lots.NONE()
         if name != self._lots.named:
             return lots.ANOTHER(lot=name, now=self._lots.named)
-        try:
-            await self._records.change(lambda connection: _end_registered(connection, name, by))
-        except RecordsError as error:
-            return message_of(error)
-        if name != self._lots.named:  # another one was started meanwhile
-            return None
-        return None if await self._lots.set_lot("") else lots.END_NOT_STORED(lot=name)
+        async with self._lot_turn:
+            if name != self._lots.named:  # another one was started meanwhile
+                return None
+            try:
+                await self._records.change_to_end(lambda connection: _end_registered(connection, name, by))
+            except RecordsError as error:
+                return message_of(error)
+            return None if await self._lots.set_lot("") else lots.END_NOT_STORED(lot=name)
 
 
 def _end_registered(connection: Connection, name: str, by: tuple[str, str]) -> None:

@@ -18,7 +18,7 @@ from station.inspection.states import STATES, State
 from station.messages import commands as messages
 from station.messages import operation, readiness
 from station.messages.maintenance import UNDER_WAY
-from station.messages.message import Message, message_of
+from station.messages.message import Message, joined, message_of
 from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import DeviceManager
 from station.runtime.observability.audit_logger import PANEL, PLC, AlarmChange, alarm_entry, command_entry
@@ -151,7 +151,7 @@ class PlcCommands:
         if new or not failures:
             self._service.alarms.clear(AlarmId.GATE_NOT_FIRED)
         if new:
-            self._service.alarms.raise_(AlarmId.GATE_NOT_FIRED, new[-1])
+            self._service.alarms.raise_(AlarmId.GATE_NOT_FIRED, joined(new))
 
     async def execute(self, command: Command, by: tuple[str, str] = (PLC, PLC)) -> CommandDone:
         """Execute one command by the name and role of who gave it."""
@@ -211,9 +211,12 @@ class PlcCommands:
             return messages.MODE_KEPT(activity=activity)
         if mode != MANUAL:
             try:
-                await self._devices.restore_light()
+                while self._devices.light_by_hand:  # also one that is set meanwhile
+                    await self._devices.restore_light()
             except CameraError as error:
                 return message_of(error)
+            if (activity := self._service.manual_activity) is not None and mode != self.mode:  # begun meanwhile
+                return messages.MODE_KEPT(activity=activity)
         self.mode = mode
         self._service.set_mode(production=mode == PRODUCTION)
         # A write that outlasts its order is not left behind, or it could replace the next order's.
@@ -314,7 +317,7 @@ class PlcCommands:
         kept = self._stop_wanted and by == (PLC, PLC)  # a hand may be at the gel, and a program resets by itself
         if why_not := self.reset_refusal() or (readiness.STOPPED_BY_PERSON() if kept else None):
             return why_not
-        state, self._stop_wanted = service.state, False
+        self._stop_wanted = False
         ordered_s, program_stopped = time.monotonic(), self._devices.program_stopped
         service.allow()
         # As of a mode: a write that outlasts the reset's deadline could replace that of a stop that comes next.
@@ -324,11 +327,14 @@ class PlcCommands:
         # The disk may take seconds, and a person's stop in them is the later order, also before its own write ends.
         if self._stop_wanted or service.stopped_by_person:
             return messages.STOPPED_MEANWHILE()
-        if state in {State.IDLE, State.RETREATING_READY}:
+        if why_not := self._later_stop(ordered_s, program_stopped=program_stopped):
+            return why_not
+        state = service.state
+        inspects = STATES[state].refusal is Refusal.BUSY and state is not State.RECORDING_LATCHED
+        if state in {State.IDLE, State.RETREATING_READY} or inspects:  # it is ready, or has been since the order
             service.alarms.reset()
             return None
-        why_not = self.reset_refusal() or self._later_stop(ordered_s, program_stopped=program_stopped)
-        return why_not or await self._make_ready(ordered_s, program_stopped=program_stopped)
+        return self.reset_refusal() or await self._make_ready(ordered_s, program_stopped=program_stopped)
 
     async def _make_ready(self, ordered_s: float, *, program_stopped: bool) -> Message | None:
         """Make the station ready from the state that it is in by now; the arguments are those of `_later_stop`."""
@@ -358,7 +364,7 @@ class PlcCommands:
             program_stopped: a person had stopped the arm's program on the pendant by then.
         """
         runner = self._service.runner
-        latched = STATES[runner.state].needs_person and runner.entered_s > ordered_s
+        latched = STATES[runner.state].needs_person and max(runner.entered_s, runner.stopped_s) > ordered_s
         stopped = self._devices.program_stopped and not program_stopped
         return self._activity() if latched or stopped else None
 

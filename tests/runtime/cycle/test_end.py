@@ -8,6 +8,7 @@ import pytest
 from station.inspection.cycle import Action
 from station.inspection.states import State
 from station.vocabulary import Reason
+from tests.eventually import PATIENCE_S
 
 
 @pytest.mark.timeout(240)
@@ -29,7 +30,7 @@ def test_an_end_whose_clean_up_takes_longer_than_its_deadline_keeps_the_fruits_o
             service._of_station = {**service._of_station, Action.OPEN_JAWS: held, Action.GO_HOME: held}
             service._of_inspection = {**service._of_inspection, Action.FREE_FRUIT: held}
             cell.station.stop()
-            async with asyncio.timeout(15):
+            async with asyncio.timeout(PATIENCE_S):
                 await asyncio.shield(cell.running)
         async with bench(file) as cell:
             return begun, (await cell.line.open()).outcomes

@@ -11,7 +11,6 @@ from hmi.past.pictures import read_stages
 from station.messages.judge import EDGE_LOST
 from station.records.database import records_folder
 from station.runtime.imaging import worker as vision_worker
-from station.vision.median import median_image
 from station.vision.methods import make_method
 from station.vocabulary import Flag, Reason
 
@@ -24,8 +23,8 @@ def measurements(monkeypatch):
     """
     made = SimpleNamespace(pairs=[], lost=False)
 
-    def recording(references, segmentation):
-        method = make_method(median_image(references), segmentation)
+    def recording(reference, segmentation):
+        method = make_method(reference, segmentation)
 
         def measure(image, on_stage=None, previous=None, agreed=1.0, *, firm_only=False):
             found = method.measure(image, on_stage, previous, agreed, firm_only=firm_only)

@@ -14,7 +14,6 @@ from station.runtime.imaging.worker import VisionWorker
 from station.settings.recipe import find_recipe
 from station.settings.service import ReferenceSettings
 from station.state_files import StateFiles
-from station.vision.median import median_image
 from station.vision.methods import make_method
 from station.vision.press import PressTracker
 from station.vision.step import measure_step
@@ -46,8 +45,8 @@ def seen_images(monkeypatch, previous_contacts):
     """The images that the worker's method was asked to measure, by their identity, in order."""
     seen: list[int] = []
 
-    def counting(references, segmentation):
-        method = make_method(median_image(references), segmentation)
+    def counting(reference, segmentation):
+        method = make_method(reference, segmentation)
 
         def measure(image, on_stage=None, previous=None, agreed=1.0, *, firm_only=False):
             seen.append(id(image))

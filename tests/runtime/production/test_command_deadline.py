@@ -89,7 +89,7 @@ class Station:
     """Service and runner in one state, which note what is posted; nothing moves."""
 
     def __init__(self, state: State) -> None:
-        self.state, self.entered_s, self.posted = state, 0.0, list[Event]()
+        self.state, self.entered_s, self.stopped_s, self.posted = state, 0.0, 0.0, list[Event]()
         self.active, self.manual_activity = None, None
         self.ending = self.stopped_by_person = False
         self.runner = self.alarms = self
@@ -163,7 +163,7 @@ def emergency_stop(station: Station, devices: Any) -> None:
 
 
 def released_emergency_stop(station: Station, devices: Any) -> None:
-    station.state, station.entered_s = State.LATCHED, time.monotonic()
+    station.stopped_s = time.monotonic()  # in LATCHED a further stop enters no state
 
 
 def stop_on_the_pendant(station: Station, devices: Any) -> None:

@@ -84,6 +84,17 @@ def test_each_fruit_that_the_gate_missed_is_announced_anew(alarms, beat):
     assert (alarm.state, alarm.detail) == (AlarmState.UNACKNOWLEDGED, UNORDERED_REPORT(sequence=42))
 
 
+def test_a_fruit_that_the_gate_missed_is_announced_also_where_the_alarm_chatters(alarms, beat):
+    for missed in ((17,), (17, 42), (17, 42, 43)):
+        beat(*rejected(*missed))
+    alarms.acknowledge(AlarmId.GATE_NOT_FIRED)
+    assert active(alarms) == {}
+    beat(*rejected(17, 42, 43, 51, 52))
+    (alarm,) = alarms.alarms.active
+    assert alarm.state == AlarmState.UNACKNOWLEDGED
+    assert all(str(sequence) in str(alarm.detail) for sequence in (51, 52))
+
+
 def test_a_failed_reject_that_is_reported_again_is_announced_once(alarms, beat):
     beat(*rejected(17, 42))
     beat(*rejected(17, 42, 17))

@@ -259,6 +259,33 @@ def test_the_end_of_a_lot_leaves_one_that_was_started_while_the_disk_was_slow(be
     assert asyncio.run(scenario()) == "B"
 
 
+def test_of_two_lots_that_are_started_at_once_the_last_one_runs(bench, monkeypatch):
+    starting, may_start = threading.Event(), threading.Event()
+    start_lot = operator_commands.start_lot
+
+    def slow(*of):
+        starting.set()
+        assert may_start.wait(60)
+        return start_lot(*of)
+
+    async def scenario():
+        async with bench() as cell:
+            assert (await give(cell, OperatorCommandName.START_LOT, "A", "Meier")).state == "done"
+            monkeypatch.setattr(operator_commands, "start_lot", slow)
+            first = asyncio.create_task(give(cell, OperatorCommandName.START_LOT, "B", "Meier"))
+            assert await asyncio.to_thread(starting.wait, 60)
+            second = asyncio.create_task(give(cell, OperatorCommandName.START_LOT, "C", "Meier"))
+            async with asyncio.timeout(60):
+                while "C" not in {each.argument for each in (await panel_state(cell)).orders}:
+                    await asyncio.sleep(0.02)
+            may_start.set()
+            assert [(await each).state for each in (first, second)] == ["done", "done"]
+            lots = await cell.station.service.registry.records.change(lambda connection: read_lots(connection, 9))
+            return (await panel_state(cell)).named_lot, {lot.name for lot in lots if not lot.ended_utc_ms}
+
+    assert asyncio.run(scenario()) == ("C", {"C"})
+
+
 def test_a_lot_in_place_of_which_another_is_started_has_ended_and_runs_when_it_is_started_again(bench):
     async def scenario():
         async with bench() as cell:
