@@ -8,12 +8,13 @@ import socket
 from collections.abc import Iterator
 
 _WORKERS = max(16, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")) + 4)
+"""With room for some that replace a crashed one: their numbers go on."""
 _FIRST, _PORTS = 10_000, 22_400 // _WORKERS
 """Below the ports of outgoing connections (on Linux from 32,768), any of which may take a port before it is bound."""
 
 
 def _own_ports() -> Iterator[int]:
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")) % _WORKERS
     first, begin = _FIRST + worker * _PORTS, secrets.randbelow(_PORTS)
     return itertools.cycle([first + (begin + place) % _PORTS for place in range(_PORTS)])
 

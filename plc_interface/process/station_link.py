@@ -28,7 +28,6 @@ from station.channel.line import (
 )
 from station.channel.messages import ChannelError, DeadlineError, RefusedError
 from station.clock import utc_ms
-from station.messages.message import text_of
 from station.messages.records import NEVER_BEGUN
 from station.settings.plc import HandshakeSettings
 
@@ -204,8 +203,9 @@ class StationLink:
                     if refused < _NOTE_TRIES:
                         await asyncio.sleep(_NOTE_AGAIN_S)
                         continue
-                    if NEVER_BEGUN.id not in text_of(error.message):  # no repetition helps
-                        self._repeat_later(action)
+                    self._repeat_later(action)
+                if NEVER_BEGUN.id in error.message.ids():  # no repetition helps
+                    self._refused.pop(action, None)
             except ChannelError as error:
                 self._notes.clear()  # resynchronisation publishes final outcomes again
                 self._refused.clear()

@@ -9,7 +9,9 @@ from plc_interface.handshake import actions as do
 from plc_interface.handshake import events as ev
 from plc_interface.process import station_link
 from plc_interface.process.station_link import StationLink
-from station.channel.line import Begin, Reason
+from station.channel.line import Begin, Noted, Published, Reason
+from station.messages import records as messages
+from station.records.errors import UnknownInspectionError
 from station.settings.plc import HandshakeSettings
 from tests.plc_interface.scripted_station import ScriptedStation, until
 
@@ -42,3 +44,32 @@ def test_a_note_that_is_refused_is_repeated_until_the_station_takes_it(refusals,
 
     with tempfile.TemporaryDirectory() as home:
         asyncio.run(main(home))
+
+
+def test_a_note_on_an_inspection_that_the_station_never_began_is_not_repeated(monkeypatch):
+    """An earlier home was put back: its number may soon be another fruit's."""
+    monkeypatch.setattr(station_link, "_NOTE_AGAIN_S", 0.01)
+    monkeypatch.setattr(station_link, "_NOTE_LATER_S", 0.01)
+    asked: list[int] = []
+
+    async def refuse(request: Published) -> Noted:
+        asked.append(request.outcome.sequence)
+        raise UnknownInspectionError(messages.NEVER_BEGUN(number=request.outcome.sequence), messages.ASK_OPEN())
+
+    async def main(home: str):
+        station = ScriptedStation(f"ipc://{home}/line.ipc")
+        station.begun[101], station.running = Begin(trigger_id=4711, encoder=0, lot=""), 101
+        outcome = station.finish("NO_RESULT", Reason.LATE)
+        monkeypatch.setattr(station, "_published", refuse)
+        settings = HandshakeSettings(station_lost_after_s=30.0)
+        link = StationLink(station.endpoint, settings, lambda _: None, lambda: pytest.fail("no beat was started"))
+        await station.start()
+        link.carry_out(do.NotifyPublished(outcome))
+        await until(lambda: asked and not link._notes)
+        await until(lambda: link._repeating is not None and link._repeating.done())
+        await link.stop()
+        await station.die()
+
+    with tempfile.TemporaryDirectory() as home:
+        asyncio.run(main(home))
+    assert asked == [101] * 3

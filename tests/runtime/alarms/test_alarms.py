@@ -170,17 +170,22 @@ def test_an_emergency_stop_that_the_gripper_tells_of_is_a_persons(bench):
     asyncio.run(scenario())
 
 
+async def latched_without_camera(cell, monkeypatch):
+    """Bring the cell to a released emergency stop and a lost camera, by which a reset is too slow."""
+    await cell.choose("blueberry")
+    cell.twin.boards["gripper"].set("emergency_stopped")
+    await cell.reach(State.LATCHED)
+    cell.twin.boards["camera"].set("off")
+    await until(lambda: "camera" in cell.station.service._devices.faults)
+    cell.twin.boards["gripper"].clear()
+    await until(lambda: not caused(cell, AlarmId.EMERGENCY_STOP))
+    monkeypatch.setattr(plc_commands, "DEADLINE_S", 0.5)
+
+
 def test_a_reset_that_a_lost_camera_delays_ends_the_stops_alarm_once_the_station_is_ready(bench, monkeypatch):
     async def scenario():
         async with bench() as cell:
-            await cell.choose("blueberry")
-            cell.twin.boards["gripper"].set("emergency_stopped")
-            await cell.reach(State.LATCHED)
-            cell.twin.boards["camera"].set("off")
-            await until(lambda: "camera" in cell.station.service._devices.faults)
-            cell.twin.boards["gripper"].clear()
-            await until(lambda: not caused(cell, AlarmId.EMERGENCY_STOP))
-            monkeypatch.setattr(plc_commands, "DEADLINE_S", 0.5)
+            await latched_without_camera(cell, monkeypatch)
             late = await cell.line.order(CommandName.RESET)
             assert not late.done
             assert late.why.id == commands.TOO_SLOW.id
@@ -195,14 +200,7 @@ def test_a_reset_that_a_lost_camera_delays_ends_the_stops_alarm_once_the_station
 def test_a_restart_after_a_persons_reset_leaves_no_latched_alarm_behind(bench, monkeypatch):
     async def scenario():
         async with bench() as cell:
-            await cell.choose("blueberry")
-            cell.twin.boards["gripper"].set("emergency_stopped")
-            await cell.reach(State.LATCHED)
-            cell.twin.boards["camera"].set("off")
-            await until(lambda: "camera" in cell.station.service._devices.faults)
-            cell.twin.boards["gripper"].clear()
-            await until(lambda: not caused(cell, AlarmId.EMERGENCY_STOP))
-            monkeypatch.setattr(plc_commands, "DEADLINE_S", 0.5)
+            await latched_without_camera(cell, monkeypatch)
             assert (await cell.line.order(CommandName.RESET)).why.id == commands.TOO_SLOW.id
             await cell.until(lambda: cell.phase is State.UNKNOWN)
             load_alarms = cell.station.service.registry.records.load_alarms

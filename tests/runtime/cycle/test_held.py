@@ -3,6 +3,7 @@
 import asyncio
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -99,3 +100,20 @@ def test_a_file_that_cannot_be_read_counts_as_a_held_fruit(tmp_path):
     (tmp_path / FILE_NAME).unlink()
     (tmp_path / FILE_NAME).mkdir()
     assert start(tmp_path)[0] is State.CARRIED
+
+
+def test_a_stop_that_comes_in_a_latched_cycle_is_noted_although_it_enters_no_state(tmp_path):
+    async def scenario():
+        performer = Performer(hold_of(tmp_path), lambda: None, lambda _state: None)
+        runner = CycleRunner(performer, Event.PROTECTIVE_STOP)
+        running = asyncio.create_task(runner.run())
+        await runner.taken()
+        entered_s, before_s = runner.entered_s, time.monotonic()
+        runner.post(Event.EMERGENCY_STOP)
+        await runner.taken()
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+        assert (runner.state, runner.entered_s) == (State.LATCHED, entered_s)
+        assert runner.stopped_s >= before_s
+
+    asyncio.run(scenario())

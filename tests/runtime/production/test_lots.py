@@ -232,7 +232,9 @@ async def begin(cell, trigger_id, lot, deadline_s=20.0):
     return await cell.line.client.request(request, BeginReply, deadline_s=deadline_s)
 
 
-def test_the_end_of_a_lot_leaves_one_that_was_started_while_the_disk_was_slow(bench, monkeypatch):
+@pytest.fixture
+def slow_start(monkeypatch):
+    """Have the records wait in the registration of each lot, once it is called: (it waits, it may go on)."""
     starting, may_start = threading.Event(), threading.Event()
     start_lot = operator_commands.start_lot
 
@@ -241,7 +243,15 @@ def test_the_end_of_a_lot_leaves_one_that_was_started_while_the_disk_was_slow(be
         assert may_start.wait(60)
         return start_lot(*of)
 
-    monkeypatch.setattr(operator_commands, "start_lot", slow)
+    def begin():
+        monkeypatch.setattr(operator_commands, "start_lot", slow)
+        return starting, may_start
+
+    return begin
+
+
+def test_the_end_of_a_lot_leaves_one_that_was_started_while_the_disk_was_slow(bench, slow_start):
+    starting, may_start = slow_start()
 
     async def scenario():
         async with bench() as cell:
@@ -259,19 +269,11 @@ def test_the_end_of_a_lot_leaves_one_that_was_started_while_the_disk_was_slow(be
     assert asyncio.run(scenario()) == "B"
 
 
-def test_of_two_lots_that_are_started_at_once_the_last_one_runs(bench, monkeypatch):
-    starting, may_start = threading.Event(), threading.Event()
-    start_lot = operator_commands.start_lot
-
-    def slow(*of):
-        starting.set()
-        assert may_start.wait(60)
-        return start_lot(*of)
-
+def test_of_two_lots_that_are_started_at_once_the_last_one_runs(bench, slow_start):
     async def scenario():
         async with bench() as cell:
             assert (await give(cell, OperatorCommandName.START_LOT, "A", "Meier")).state == "done"
-            monkeypatch.setattr(operator_commands, "start_lot", slow)
+            starting, may_start = slow_start()
             first = asyncio.create_task(give(cell, OperatorCommandName.START_LOT, "B", "Meier"))
             assert await asyncio.to_thread(starting.wait, 60)
             second = asyncio.create_task(give(cell, OperatorCommandName.START_LOT, "C", "Meier"))
