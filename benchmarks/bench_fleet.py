@@ -152,7 +152,7 @@ def processor_s() -> float:
 
 
 def records(days: int) -> Part:
-    """A year of ten stations in PostgreSQL, and the board Quality on it."""
+    """A year of ten stations in PostgreSQL, and the dashboard Quality on it."""
     queries = {panel.title: target["rawSql"] for panel in panels() for target in panel.targets if "rawSql" in target}
     for variable in dashboards()["quality"]["templating"]["list"]:
         if variable["type"] == "query":
@@ -180,7 +180,7 @@ def records(days: int) -> Part:
             ).fetchone()
             version = connection.info.parameter_status("server_version")
     rows = [
-        "| query of the board Quality | day | month | year | year, worst | year, on the inspections | answers |",
+        "| query of the dashboard Quality | day | month | year | year, worst | year, on the inspections | answers |",
         "|---" * 7 + "|",
     ]
     for title in queries:
@@ -201,7 +201,8 @@ def records(days: int) -> Part:
 {STATIONS} stations, {year.A_MINUTE} fruit a minute, {year.HOURS} h a day, {days} days: {inspections:,} inspections, made
 in {loaded_s / 60:.1f} min through the deployed schema and its triggers by a series in the server: {sizes[0]}; the
 summaries by hour {sizes[1]}, {sizes[2]:,} rows. PostgreSQL {version} with its default settings, as deployed. Seconds,
-median of {year.RUNS} runs; beside it the same question put to the inspections themselves, once, as the board did before.
+median of {year.RUNS} runs; beside it the same question put to the inspections themselves, once, as the
+dashboard did before.
 Medians are compared to {plain.MEDIAN_TOLERANCE:.1%}, all else exactly.
 
 {table}
@@ -223,7 +224,7 @@ def make_block(folder: Path, begin_s: int, end_s: int) -> int:
 
 
 def metrics() -> Part:
-    """A year of ten stations in Prometheus, and the board Fleet on it."""
+    """A year of ten stations in Prometheus, and the dashboard Fleet on it."""
     began_s = time.monotonic()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -245,7 +246,7 @@ def metrics() -> Part:
         with running(folder, configuration, "--storage.tsdb.retention.time=10y") as prometheus:
             found = list(metrics_year.measure(prometheus, queries, YEAR_END_S - metrics_year.STEP_S))
     rows = [
-        "| query of the board Fleet | series | day | month | year | year, worst |",
+        "| query of the dashboard Fleet | series | day | month | year | year, worst |",
         "|---" * 6 + "|",
     ]
     for day, month, whole in zip(found[::3], found[1::3], found[2::3], strict=True):
@@ -257,8 +258,8 @@ def metrics() -> Part:
     wrong += [f"{each.panel}: no answer" for each in found if not each.series]
     table = "\n".join([*rows, f"| slowest of all | | | | | {max(each.worst_s for each in found):.3f} |"])
     text = f"""
-{STATIONS} stations, {YEAR_DAYS} days, a sample every {metrics_year.STEP_S // 60} minutes of each series that the board asks
-for, scraped or as the deployed rules record it: {samples:,} samples, made in {made_s / 60:.1f} min. Seconds, median of
+{STATIONS} stations, {YEAR_DAYS} days, a sample every {metrics_year.STEP_S // 60} minutes of each series that the dashboard
+asks for, scraped or as the deployed rules record it: {samples:,} samples, made in {made_s / 60:.1f} min. Seconds, median of
 {metrics_year.RUNS} runs; a curve has {metrics_year.POINTS} points, a number or table is of the last moment.
 
 {table}

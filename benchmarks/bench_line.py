@@ -79,9 +79,9 @@ def main() -> None:
     text = f"""# A line at {asked.a_minute:g} fruit a minute
 
 Written by `./run bench line`. Fruit arrive every {60 / asked.a_minute:.1f} s, {DAMAGED_SHARE:.0%} of them damaged,
-and are inspected by the shipped recipes. One that the nest is not free for waits before it: one that is centred or
-pressed twice may take longer than the pace, and others take less. *Books* are the PLC's readings, the records and the
-metrics. On the twin; unverified on hardware.
+and are inspected by the shipped recipes. If the nest is not free, a fruit waits in front of it: one that is centred
+or pressed twice may take longer than the pace, and others take less. *Books* are the PLC's readings, the records and
+the metrics. On the twin; unverified on hardware.
 
 {pace_table}
 

@@ -86,7 +86,10 @@ def presses_table(folder: Path, worst: Path | None) -> list[str]:
     edges = [circle(row, ("centre_x_px", "centre_y_px", "radius_px")) for row in rows]
     outlines = [circle(row, ("outline_x_px", "outline_y_px", "outline_radius_px")) for row in rows]
     lines = [
-        "| method | IoU, edge: median / p10 | area over truth: p50, p10 to p90 | IoU, outline | area over it | ms |",
+        (
+            "| method | IoU, edge: median / p10 | area over truth: p50, p10 to p90 | IoU, outline"
+            " | area over the outline's | ms |"
+        ),
         "|---|---|---|---|---|---|",
     ]
     for name, measure in methods(reference).items():
@@ -354,7 +357,7 @@ def main() -> None:
         "",
         *tables["soft"],
         "",
-        f"## Does it hang on the choice of presses? {SPLITS} random splits, both ways",
+        f"## Does the result depend on the choice of presses? {SPLITS} random splits, both ways",
         "",
         "`gate_ratio`, `least_bend` and `edge_stiffness` chosen on one half of the presses and backgrounds (the best",
         f"mean IoU of {len(TRIED)} combinations, a background with a false area costing 1), scored on the other half:",

@@ -160,7 +160,7 @@ def whole_rows() -> list[tuple[str, float, str, float | None]]:
     middle, theirs_ms = statistics.median(touching), statistics.median(paper)
     return [
         (f"`paper`, whole, median of {len(paper)} frames", theirs_ms, "", None),
-        (f"`robust`, whole, median of the same frames: 1/{theirs_ms / middle:.0f}", middle, "", None),
+        (f"`robust`, whole, median of the same frames (1/{theirs_ms / middle:.0f} of paper's time)", middle, "", None),
         *((f"`robust`, {name}", statistics.median(each), "", None) for name, each in robust.items()),
     ]
 

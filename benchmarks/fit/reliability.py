@@ -246,7 +246,7 @@ def reliability(images: Path, processes: int) -> list[str]:
 def smallest(counts: Mapping[str, Sequence[Count]]) -> float | None:
     """The smallest least confidence from which on neither real presses nor the twin's fruit are wrong too often.
 
-    The soft bodies have no say: what is wrong there are long rods of half the field, and no fruit is one.
+    Soft bodies do not count for this: what is wrong there are long rods of half the field, and no fruit is one.
     """
     chosen = None
     for place in reversed(range(len(LEAST_CONFIDENCES))):
@@ -291,7 +291,7 @@ def _lines(counts: Mapping[str, Sequence[Count]], areas: Sequence[Mapping[str, S
     lines += [
         "",
         f"The smallest least confidence for at most {limits} {answer}.",
-        "The soft bodies are not asked: what is wrong there are long rods of half the field, and no fruit is one.",
+        "Soft bodies do not count for this: what is wrong there are long rods of half the field, and no fruit is one.",
         "",
         f"![curve]({PICTURE.name})",
         "",

@@ -221,7 +221,7 @@ def differences(found: dict[str, list[Round]]) -> list[str]:
         lines.append(f"| {row.title}, {row.unit} | {' | '.join(cells)} |")
     panels_cost = told[BOTH][PANELS]
     under = "less" if panels_cost.highest < MOST_PERCENT else "not surely less"
-    sentences.append(f"- What three panels cost of both processes is {under} than {MOST_PERCENT} % of {CORES} cores.")
+    sentences.append(f"- Three panels cost both processes together {under} than {MOST_PERCENT} % of {CORES} cores.")
     for name in ours:
         said = [_sentence(row, told[row][name]) for row in (OWN, P50, P99)]
         sentences.append(f"- {name[0].upper()}{name[1:]}: {'; '.join(said)}.")

@@ -110,7 +110,7 @@ def gate_table(contacts: list[Light], presses: list[Beside]) -> list[str]:
         size = (response.shape[1], response.shape[0])
         clear = cv2.resize(far.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
         beside.append(float(response[clear].max()))
-    header = f"| a gate of the response at | finds {LIGHT_AREAS_MM2[0]} mm² | opens on the untouched twin "
+    header = f"| a threshold of the response at | finds {LIGHT_AREAS_MM2[0]} mm² | opens on the untouched twin "
     lines = [header + "| beside a real press |", "|---|---|---|---|"]
     for gate in GATES:
         cells = (f"{sum(one > gate for one in some)} of {len(some)}" for some in (lightest, empty, beside))
@@ -118,9 +118,9 @@ def gate_table(contacts: list[Light], presses: list[Beside]) -> list[str]:
     return [
         *lines,
         "",
-        f"The gate is at {GATE:g}. The untouched twin is that of the plain units above. Beside a real press is beyond",
-        f"{UNTOUCHED_RADII:g} radii of its annotated outline, in a single frame against a single reference: what",
-        "exceeds it there may be the gel that the ball draws down, which does touch, or a real drift.",
+        f"The threshold is at {GATE:g}. The untouched twin is that of the plain units above. Beside a real press is",
+        f"beyond {UNTOUCHED_RADII:g} radii of its annotated outline, in a single frame against a single reference:",
+        "what exceeds it there may be the gel that the ball draws down, which does touch, or a real drift.",
     ]
 
 

@@ -52,7 +52,7 @@ def untouched_table() -> list[str]:
     """False areas in each condition, whether they would be judged, and how near the light touches' gate they come."""
     header = "| untouched twin | frames | with a false area | on units | of them judged | `undecided` "
     lines = [
-        header + f"| the light touches' response, at most | {PEER}: with a false area |",
+        header + f"| the weak-contact detector's response, at most | {PEER}: with a false area |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for condition in CONDITIONS:

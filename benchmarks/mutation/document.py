@@ -1,4 +1,4 @@
-"""docs/mutation.md: of each room how many mutants died, which change nothing, and which live."""
+"""docs/mutation.md: of each package how many mutants were killed, which are equivalent, and which survived."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ def page(known: Mapping[str, Outcome]) -> str:
         unmet = outcome.counts.get(Fate.NO_MODULE, 0)
         sampled = count + unmet < outcome.of
         interval = binomtest(killed, count).proportion_ci(method="wilson")
-        shown = f"{100 * interval.low:.1f} to {100 * interval.high:.1f} %" if sampled else "all met"
+        shown = f"{100 * interval.low:.1f} to {100 * interval.high:.1f} %" if sampled else "all tested"
         rows.append(
             f"| {name} | {outcome.of:,} | {unmet:,} | {count:,} | {killed:,} | {len(same)} | {len(left)} "
             f"| {100 * killed / count:.1f} % | {shown} "
@@ -44,34 +44,34 @@ def page(known: Mapping[str, Outcome]) -> str:
         "# Mutation testing",
         "",
         "Written by `./run bench mutation`. A mutant is the code with one small change: `<` for `<=`, `and` for `or`,",
-        "a number one more, a call, an argument or a row of a table left out. The room's own tests meet each mutant;",
-        "one of them has to fail. Property tests take 10 examples, always the same ones, so a run can be repeated.",
+        "a number one more, a call, an argument or a row of a table left out. Each mutant is run against its package's",
+        "own tests; one has to fail. Property tests take 10 examples, always the same ones, so a run can be repeated.",
         "",
-        ("| room | mutants | not importable | met | killed | equal | alive | killed of all met | 95 % interval "
-        "| of those not equal | commit |"),
+        ("| package | mutants | not importable | tested | killed | equivalent | survived | killed of all tested "
+        "| 95 % interval | of those not equivalent | commit |"),
         f"|{'---|' * 11}",
         *rows,
         "",
-        "A mutant that cannot be imported is met by no test. Where the others were sampled evenly (`--every N`), the",
-        "interval is Wilson's for the share of all; a sample whose survivors got tests and were met again (`--alive`)",
-        "is better than the rest of its room. *Equal* ones change nothing that anyone could see: each was examined,",
-        "and is listed with its reason in `benchmarks/mutation/equal.toml`. Why a runner of our own:",
-        "[decision 81](decisions/0081-mutation-testing-of-the-pure-rooms.md).",
+        "A mutant that cannot be imported is not tested. Where the others were sampled evenly (`--every N`), the",
+        "interval is Wilson's for the share of all; a sample whose survivors got tests and were tested again",
+        "(`--alive`) is better than the rest of its package. *Equivalent* ones change nothing that anyone could see:",
+        "each was examined, and is listed with its reason in `benchmarks/mutation/equal.toml`. Why a runner of our",
+        "own: [decision 81](decisions/0081-mutation-testing-of-the-pure-rooms.md).",
         "",
-        "| room | modules | tests |",
+        "| package | modules | tests |",
         "|---|---|---|",
         *rooms,
-        *(["", "## Equal", "", "| mutants | why they change nothing |", "|---|---|"] if why else []),
+        *(["", "## Equivalent", "", "| mutants | why they change nothing |", "|---|---|"] if why else []),
         *(f"| {count} | {reason} |" for reason, count in why.most_common()),
-        *(["", "## Alive"] if alive else []),
+        *(["", "## Survived"] if alive else []),
         *alive,
         "",
         "## Again",
         "",
         "```",
-        "./run bench mutation  # all rooms",
+        "./run bench mutation  # all packages",
         "./run bench mutation --room judge --every 5  # a sample, for a busy machine",
-        "./run bench mutation --room judge --alive  # after tests were added: those that lived",
+        "./run bench mutation --room judge --alive  # after tests were added: those that survived",
         "```",
         "",
     ])  # fmt: skip

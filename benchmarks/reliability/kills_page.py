@@ -19,15 +19,15 @@ person, up to two more processes are killed before the person comes (*held*).
 
 After each round: one outcome for each trigger, the same in the records, and acknowledged; no PASS for a bruised fruit,
 no FAIL for a sound one. What only a person may end is still held after each kill, nothing moves in it, and the person's
-recovery and reset lead on. The arm carries the fruit to its place in three of four stations; there a kill of the
-service or of the arm's process with a judged fruit between the jaws has to be held too, and the jaws stay closed. The
-supervisor's processes are killed at most five times a minute each: it gives up what ends more often. After 20 rounds
-the station ends; `station records check` then has to find no fault and nothing to put right, and every inspection has
-an outcome that the PLC acknowledged, and is in the outbox. `--seed S` repeats a station's plan, not its moments.
-[Kills of the records alone](records-kills.md) have a page of their own.
+recovery and reset make it ready again. The arm carries the fruit to its place in three of four stations; there a kill
+of the service or of the arm's process with a judged fruit between the jaws has to be held too, and the jaws stay
+closed. The supervisor's processes are killed at most five times a minute each: it gives up what ends more often. After
+20 rounds the station ends; `station records check` then has to find no fault and nothing to put right, and every
+inspection has an outcome that the PLC acknowledged, and is in the outbox. `--seed S` repeats a station's plan, not its
+moments. [Kills of the records alone](records-kills.md) have a page of their own.
 
-A trigger that comes while the station does not miss the killed process yet gets no inspection: the PLC reads a refusal,
-or no answer in time, and diverts the fruit.
+A trigger that arrives before the station has noticed the kill gets no inspection: the PLC reads a refusal, or no answer
+in time, and diverts the fruit.
 """
 
 

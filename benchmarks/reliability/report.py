@@ -48,6 +48,7 @@ def markdown(rows: Sequence[Row], scenarios: Sequence[Scenario]) -> str:
     lines = [
         f"{len(rows)} rows: {held} hold, {len(rows) - held - skipped} do not, {skipped} could not be played.",
         f"Played: {_days(rows)}.",
+        "Rows played on an earlier day quote that day's wording.",
         "",
         "| fault | phase | outcome | alarms | ready again | holds |",
         "|---|---|---|---|---|---|",
@@ -61,13 +62,15 @@ def markdown(rows: Sequence[Row], scenarios: Sequence[Scenario]) -> str:
         "|---|---|",
         *_sentences(rows),
         "",
-        "## Not played",
-        "",
-        *(_unplayed(rows, scenarios) or ["Nothing of the scenarios."]),
-        "",
+        *_section("Not played", _unplayed(rows, scenarios)),
+        *_section("Remarks", [f"- `{scenario.name}`: {scenario.remark}" for scenario in scenarios if scenario.remark]),
     ]
-    remarks = [f"- `{scenario.name}`: {scenario.remark}" for scenario in scenarios if scenario.remark]
-    return _HEAD + "\n".join([*lines, *(["## Remarks", "", *remarks, ""] if remarks else [])])
+    return _HEAD + "\n".join(lines)
+
+
+def _section(title: str, lines: Sequence[str]) -> list[str]:
+    """A section's lines; nothing for one without content."""
+    return [f"## {title}", "", *lines, ""] if lines else []
 
 
 def _days(rows: Sequence[Row]) -> str:

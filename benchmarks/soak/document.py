@@ -36,58 +36,20 @@ PACE_A_MINUTE = 18
 FOUND = """\
 ## What was found and fixed
 
-The service grew by 27 MB an hour (24 to 29 at 95%) in a run of 53 minutes on 2026-11-26. Each request to the arm's
-process left a cancelled wait for that process's end behind, which Python 3.11 keeps until the process has ended. All
-requests share one wait now (`tests/devices/arm/test_process_messages.py`). A bench, which has no arm, never had it.
+| cause | effect | now |
+|---|---|---|
+| each request to the arm's process left a cancelled wait behind (Python 3.11) | +27 MB an hour | one shared wait \
+(`tests/devices/arm/test_process_messages.py`) |
+| one kept error was raised again at each check; its traceback grew | grows while the arm waits for a person | \
+raised without it (`tests/test_errors.py`) |
+| each thread's heap kept its largest images | 171 MB after 13 min | one heap for all threads: 159 MB \
+(`tests/test_memory.py`) |
+| freed memory was retained | steps of 2 to 4 MB | returned once a minute, also during the retreat |
+| `pathlib` interns each part of a path | a step of some 3 MB (inferred); never given back in Python 3.12 before \
+3.12.7 | image and unfinished files do not use `pathlib` (`tests/records/test_images.py`, \
+`tests/test_atomic_file.py`) |
 
-Seen from inside meanwhile, a station whose arm waited for a person grew too, at each check: the fault, one kept
-error, was raised again, and Python adds to an error's traceback each time. It is raised without it now
-(`tests/test_errors.py`).
-
-Each thread's heap kept that thread's largest images: two stations side by side, on 2026-11-27, had 171 MB after 13
-minutes so, and 159 MB with one heap for all threads, which they have since (`tests/test_memory.py`); their twins had
-314 and 219 MB. What grew after the first quarter of an hour was the log's newest 1,000 lines, for the page Maintenance,
-until there were so many: in some 40 minutes. A line took 0.75 kB, and takes 0.34 kB since.
-
-What is left are steps. In the run of 55 minutes on that day, before the shorter lines, the service had 163.5 MB for
-eight minutes and 165.4 MB for the last eight, to a tenth of a megabyte. Between them, in one window of ten seconds, the
-machine was busy elsewhere (the PLC's p99 was four times as long), and the service took 1.9 MB and the twin some more
-that they keep: freed memory is retained on purpose (`station/memory.py`), so a slope over an hour is the steps'.
-
-The service returns such memory since: once a minute, at first where it waited for a trigger just then. Of two
-stations side by side for 12 minutes on that day, the one without it stepped from 153.6 to 157.6 MB and stayed there;
-the one with it stepped from 154.8 to 158.5, and had 154.9 again from the next return on. A line at full pace triggers
-during the retreat and hardly lets the station wait: traced later that day, the service returned nothing in 150
-seconds. It does so during the retreat too since. In the next run of 55 minutes it rose by 0.46 MB an hour (0.18 to 0.58
-at 95%): 158.1 MB in most windows of the last 30 minutes, and 133 where one ended just after a return.
-
-In the next run, of an hour on that day, the PLC's reply and the trigger's way to the outcome were flat, and the service
-was at +3.45 MB an hour (2.05 to 5.07). Installations and tests ran beside it at idle priority for most of the time: a
-slower machine takes longer to fill the heap again after a return, so that windows ended anywhere between 136 and 161
-MB, ever fewer of them low. Since then the most of each two minutes is judged.
-
-The hour after had nothing of ours beside it, but a machine that was busy elsewhere, as the bare server's p99 suggests
-(16 ms in its worst window, 0.6 as a rule): +0.54 MB an hour, from -0.76 to +2.33, which decides nothing. To judge the
-least in place of the most would hardly decide sooner: in a run of four minutes, read twice a second, the least resident
-memory after each return was 175, 190, 193 and 191 MB.
-
-Two hours, also on that day, with nothing beside them for the first 95 minutes: +2.92 MB an hour (1.48 to 4.31), so not
-under 1. It is one step: 157 to 160 MB from minute 14 to 66, and 160 to 165 from minute 68 on. Read from outside, what
-the heap had in use in pieces under 20 kB was 30.3 MB in minute 97 and 30.2 in minute 119, some 500 fruit later, and the
-memory outside of the heap was the same to the kilobyte. A piece of 3.84 MB was new: the size of Python's table of
-interned strings once it has been enlarged. In Python 3.11 `pathlib` interns every part of a path, and each image has a
-name and a folder of its own, as has its unfinished file. In another run the table had 65,819 of its 87,381 places taken
-after 11 minutes, and took 484 more in a minute; the place of a name that is gone is free only once the table is made
-anew. By `used * 3` (CPython's Objects/dictobject.c) it doubles then, and stays so large from then on. That the step was
-this is inferred from its minute and its size, not watched; the enlarged table would explain 1.9 of its some 3 MB.
-
-Python 3.12 before 3.12.7 never gives an interned name back (github.com/python/cpython/issues/113993), so that such
-names are lost for ever there: with 3.12.1, a station that inspected fruit after fruit for 100 seconds interned 115 more
-in a minute. Neither an image's path nor a file's unfinished one goes through `pathlib` since 2026-11-28
-(`tests/records/test_images.py`, `tests/test_atomic_file.py`): it interned none in as long. With Python 3.11, in the
-twentieth minute of the next soak, the table took 9 more in a minute, in place of 484: its places suffice for two days.
-In the 80 minutes of that soak, with nothing beside it, no process rose in a step. The service is at +0.44 MB an hour,
-from +0.00 to +1.53: the width of the interval leaves it undecided.\
+The log's newest 1,000 lines fill in some 40 minutes, at 0.34 kB a line.\
 """
 """Written by hand: the stories behind a figure that was wrong once."""
 
