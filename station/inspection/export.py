@@ -28,14 +28,13 @@ CYCLE = f"""# The cycle
 
 {MADE}
 The station's cycle is one table in `station/inspection/cycle.py`: a state and an event lead to a state and actions.
-What it does not list is refused and counted. The service carries the actions out and reports what came of them as
-events.
+What it does not list is refused and counted. The service carries the actions out and reports their results as events.
 
 ![The cycle](cycle.svg)
 
-The drawing leaves the disturbances out; the table below has them. A thick frame: an inspection that is not judged
-yet, which ends as NO_RESULT when it is disturbed. Red: only a person leads on. Where the arm or the gripper fails, the
-station waits in `held` until it was read again.
+The drawing leaves the disturbances out; the table below has them. A thick frame: an inspection that is not judged yet,
+which ends as NO_RESULT when it is disturbed. Red: only a person can continue from here. Where the arm or the gripper
+fails, the station waits in `held` until it was read again.
 
 What tests prove by walking through everything that the table can lead to, with a crash at any moment:
 

@@ -107,8 +107,8 @@ class SizeOfFruit(Settings):
     expected_ratio: RatioRange | None = setting(
         None,
         title="Expected length over width",
-        description="A length outside, of the width at which the gripper met the fruit, is another fruit's: no result. "
-        "Null: not checked.",
+        description="Permitted ratio of the length to the width at first contact. Outside it the length is taken for "
+        "another fruit's: no result. Null: not checked.",
     )
     uncertainty_mm: float = setting(
         title="Uncertainty of the length",
@@ -239,9 +239,10 @@ class DamageThresholds(Settings):
     ] = setting(
         default="every_limit",
         title="Decided by",
-        description="`every_limit` checks each area threshold. `every_trusted` checks each whose area is trusted, and "
-        "needs one; where the last is not, its area may be larger than was seen, but has to be a fruit's in a sound "
-        "image. `first_trusted` takes the first whose area is trusted; later ones are for fruit whose area is not.",
+        description="`every_limit` checks each area threshold. `every_trusted` checks each whose area is trusted, "
+        "and needs at least one. Where the last one's is not trusted because the contact may be larger than was seen, "
+        "the earlier ones decide, if the area is large enough for a fruit and the image is sound. `first_trusted` "
+        "takes the first whose area is trusted; later ones are for fruit whose area is not.",
     )
     growth_mm2_per_mm: float = setting(
         title="Growth threshold",

@@ -100,8 +100,8 @@ class WidthSteps(Settings):
     measured: Annotated[Literal["at_rest", "while_closing"], Field(exclude_if=lambda way: way == "at_rest")] = setting(
         default="at_rest",
         title="Measured",
-        description="`while_closing` makes the steps up to the last damage threshold that a fruit has to keep without "
-        "a stop, each camera image with the width at its capture: a fruit takes less time. `at_rest` stops for each.",
+        description="`at_rest` stops for each step. `while_closing` closes without a stop up to the last damage "
+        "threshold that a fruit has to keep, and takes each image's width at its capture: a fruit takes less time.",
     )
 
     @property

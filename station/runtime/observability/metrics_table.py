@@ -198,7 +198,8 @@ TABLE: dict[str, Row] = {
         "station_outbox_lag_seconds",
         "gauge",
         ("destination",),
-        "Time since the first of them was made, by the machine's clock; 0 where none waits; while unknown, time away",
+        "Time since the first of them was made, by the machine's clock; 0 where none waits; while unknown, the time "
+        "since the other system was lost",
         at_scrape=True,
     ),
     "outbox_refused": Row(
