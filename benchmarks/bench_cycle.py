@@ -3,7 +3,7 @@
 Run with `./run bench cycle`. Starts a twin with an arm and the station's process, has fruit inspected over the channel,
 one by one and then as fast as triggers are accepted, and makes the same moves and waits without the station: the same
 drivers, the measured widths, as many frames, nothing else. Writes `docs/cycle-time.md`, `docs/images/cycle-time.svg`,
-and the pace into `README.md`, `docs/sizing.md` and `docs/plc/index.md`.
+and the pace into `README.md` and `docs/plc/index.md`.
 """
 
 import asyncio
@@ -65,7 +65,7 @@ FRUIT = ("strawberry", "raspberry", "blueberry")
 SEEDS = range(1, 16)
 """Of each kind's fruit. Several, since the steps that one needs depend on it; odd, so that one is the median."""
 IN_A_ROW = 8
-PAGES_WITH_PACE = ("README.md", "docs/sizing.md", "docs/plc/index.md")
+PAGES_WITH_PACE = ("README.md", "docs/plc/index.md")
 PATIENCE_S = 120.0
 PHASES = {
     "retreating_accepted": "approach",
@@ -103,8 +103,8 @@ anywhere: [a mixed line](triggers.md). Unverified on hardware.
 
 {table}
 
-*Measured*: by the shipped recipe's `steps.measured`. *Otherwise*: the other way, in the same run. The force on the
-fruit by both ways:
+*Steps measured*: by the shipped recipe's `steps.measured`. *Otherwise*: the other way, in the same run. The force
+on the fruit by both ways:
 [decision 63](decisions/0063-measurement-while-the-jaws-close.md#force-on-the-fruit).
 
 ![The floor's parts and ours](images/cycle-time.svg)
@@ -362,9 +362,10 @@ def table(
         cells += [f"{outcome_s:.2f}", f"{next_s:.2f}", f"{pace.a_minute:.1f}"]
         cells += [*(f"{seconds:.2f}" for seconds in medians(other[kind])), f"{other[kind].a_minute:.1f}"]
         rows.append(f"| {' | '.join(cells)} | {floor_s:.2f} | {ours_s:.2f} | {100 * ours_s / floor_s:.1f} % |")
-    names = ("fruit", "measured", "outcome", "closed on twice", "to outcome, s", "to next trigger, s", "fruit a minute")
-    others = ("otherwise: to outcome", "to next trigger", "fruit a minute", "floor, s", "ours, s", "% of the floor")
-    return [f"| {' | '.join((*names, *others))} |", "|---" * len((*names, *others)) + "|", *rows]
+    names = ("fruit", "steps measured", "outcome", "closed on twice", "to outcome, s", "to next trigger, s")
+    others = ("fruit a minute", "otherwise: to outcome", "to next trigger", "fruit a minute", "floor, s", "ours, s")
+    heads = (*names, *others, "% of the floor")
+    return [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|", *rows]
 
 
 def pace_table(shipped: Mapping[str, Recipe], results: Mapping[str, Pace], other: Mapping[str, Pace]) -> list[str]:
@@ -384,11 +385,11 @@ def pace_table(shipped: Mapping[str, Recipe], results: Mapping[str, Pace], other
         rows.append(f"| {' | '.join(cells)} |")
     names = (
         "fruit",
-        "measured",
+        "steps measured",
         "fruit a minute",
         "trigger to outcome, s",
         "to the next trigger, s",
-        "measured otherwise",
+        "fruit a minute the other way",
     )
     return [f"| {' | '.join(names)} |", "|---" * 6 + "|", *rows]
 

@@ -68,7 +68,7 @@ def main() -> None:
     cores = f"{os.cpu_count()} cores ({platform.machine()})"
     passed, skipped = total(tests, "passed"), total(tests, "skipped")
     lines = [
-        "| in a fresh clone | took | to install, of it |  |",
+        "| in a fresh clone | took | of that, installing | result |",
         "|---|---|---|---|",
         f"| `./run demo --count 3` | {demo_s:.0f} s | {installing_s(demo)} s | |",
         f"| `./run test` | {test_s / 60:.1f} min | {installing_s(tests)} s | {passed:,} passed, {skipped} skipped |",

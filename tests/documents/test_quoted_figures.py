@@ -33,7 +33,7 @@ def said(page, pattern):
     return [float(each.replace(",", "")) for each in ([found] if isinstance(found, str) else found)]
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/sizing.md", "docs/plc/index.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/plc/index.md"])
 @pytest.mark.parametrize("fruit", FRUIT)
 def test_the_pace_is_the_cycle_times(text, page, fruit):
     for column, (source, decimals) in PACE.items():
