@@ -45,7 +45,7 @@ from station.commands.simulated_unit import calibrate_simulated_unit
 from station.devices.arm.ur import UrArm
 from station.devices.camera.open import camera_from
 from station.devices.gripper.robotiq import make_gripper
-from station.press.rig import FINEST_STEP_MM
+from station.inspection.press import FINEST_STEP_MM
 from station.press.stop import MOST_UNSEEN_MM
 from station.records.model import FullRecord
 from station.records.records import Records

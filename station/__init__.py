@@ -2,6 +2,6 @@
 
 import os
 
-# The sums of a matrix product hang on how many threads share it, and small ones gain nothing: the same image then has
-# the same area whatever the number of cores. It is read when numpy is first imported, so it stands here.
+# One thread: the rounding of a matrix product depends on how many threads share it, so an area would depend on the
+# number of cores; small products gain nothing from more. Set here because numpy reads it at its first import.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -5,8 +5,8 @@ import os
 import secrets
 from pathlib import Path
 
-# No path with a name that comes but once goes through pathlib here: it interns every part of a path, and Python 3.12
-# before 3.12.7 never gives an interned string back (github.com/python/cpython/issues/113993).
+# No path with a name that is used only once goes through pathlib here: it interns every part of a path, and Python
+# 3.12 before 3.12.7 never gives an interned string back (github.com/python/cpython/issues/113993).
 
 PARTIAL = ".partial"
 """Suffix of a file that is not complete; one that a killed process left may be removed."""

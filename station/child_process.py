@@ -15,7 +15,7 @@ def end_with(parent: int) -> None:
     """Have the kernel kill this process when the one that started it ends; elsewhere than on Linux do nothing.
 
     Args:
-        parent: the starter's process id, which is another one's if it has ended by now.
+        parent: process id of the starter; the present parent has another one if the starter has ended.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)

@@ -18,7 +18,7 @@ class StationError(Exception):
         self.message = verbatim(message) if isinstance(message, str) else message
 
     def again(self) -> Self:
-        """Return this error, which was kept, to be raised once more.
+        """Return this stored error without its traceback, to be raised again.
 
         Python adds to an error's traceback, with all that its functions held, each time it is raised: one that is kept
         for as long as a device waits for a person would grow by megabytes an hour.

@@ -25,7 +25,7 @@ class StateFiles:
             return None
 
     def is_missing(self, name: str) -> bool:
-        """Return whether a file is surely not in the folder: one that cannot be read may say anything."""
+        """Return whether a file certainly does not exist; false where that cannot be found out."""
         try:
             (self.folder / name).lstat()
         except FileNotFoundError:

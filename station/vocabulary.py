@@ -3,6 +3,9 @@
 from enum import StrEnum
 from typing import Literal
 
+LONGEST_LOT = 32
+"""Characters of a lot's name at most, as in the PLC's registers."""
+
 OutcomeName = Literal["PASS", "FAIL", "NO_RESULT"]
 
 

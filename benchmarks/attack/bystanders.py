@@ -19,7 +19,7 @@ from urllib.parse import urlencode, urlsplit
 
 from station.channel.client import ChannelClient
 from station.channel.messages import ChannelError
-from station.channel.panel_live import GetPanelState, PanelState
+from station.channel.panel_run import GetPanelState, PanelState
 
 HOST, PLC, PANEL = "10.79.0.1", "10.79.0.2", "10.79.0.3"
 """The station's address in the attack's own network, and those of the two."""

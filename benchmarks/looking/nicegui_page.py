@@ -15,7 +15,7 @@ from nicegui import app, ui  # pyrefly: ignore[missing-import] (an environment o
 from hmi.run import charts
 from hmi.web.gateway import Gateway
 from hmi.web.translation import Locale
-from station.channel.panel_live import Fruit, GetPicture, Picture
+from station.channel.panel_run import Fruit, GetPicture, Picture
 from station.charts.spark import spark
 from station.settings.configuration import load_configuration
 from station.settings.hmi import panel_endpoint

@@ -25,7 +25,7 @@ from plc_interface.plc_simulator.scan import Scanner
 from plc_interface.registers.codec import WordOrder
 from station.channel.client import ChannelClient
 from station.channel.panel import Actor
-from station.channel.panel_live import (
+from station.channel.panel_run import (
     GetPanelState,
     OperatorCommand,
     OperatorCommandName,

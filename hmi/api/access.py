@@ -12,7 +12,7 @@ from hmi.api.tokens import ApiTokens
 from hmi.web.access import caller_of, genuine, hmi_of
 from hmi.web.roles import RIGHTS, Right, Role
 from station.channel.panel import Actor
-from station.channel.panel_live import PersonNoted
+from station.channel.panel_run import PersonNoted
 
 LONGEST_TOKEN = 200
 _bearer = HTTPBearer(

@@ -29,8 +29,8 @@ from hmi.past.recipes import RecipeState
 from hmi.web.access import HmiNow
 from hmi.web.roles import Right
 from station.channel.panel import Actor, AlarmList, ListAlarms
-from station.channel.panel_maintenance_queries import GetHealth, Health
-from station.channel.panel_queries import EndLot, LotView, Search, StartLot
+from station.channel.panel_lots import EndLot, LotView, Search, StartLot
+from station.channel.panel_maintenance import GetHealth, Health
 from station.vocabulary import OutcomeName, Reason
 
 IN_SCHEMA = True

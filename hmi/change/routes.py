@@ -17,7 +17,7 @@ from hmi.web.problem import Problem
 from hmi.web.roles import Right
 from hmi.web.sessions import Caller
 from hmi.web.translation import NO_VALUE, Locale
-from station.channel.panel_live import (
+from station.channel.panel_run import (
     GetRecipes,
     OperatorCommand,
     OperatorCommandName,

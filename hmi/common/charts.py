@@ -6,7 +6,7 @@ from typing import TypeVar
 from markupsafe import Markup
 
 from hmi.web.translation import Locale
-from station.channel.panel_live import LimitView
+from station.channel.panel_run import LimitView
 from station.charts.area_chart import Curve, Limit, Mark, Size, Texts, area_chart
 
 LimitT = TypeVar("LimitT", Limit, LimitView)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from station.channel.panel_live import OperatorCommandView
+from station.channel.panel_run import OperatorCommandView
 
 _FAILED_SHOWN_MS = 60_000
 

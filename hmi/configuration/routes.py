@@ -16,7 +16,7 @@ from hmi.web.page import go_to, show
 from hmi.web.problem import Problem
 from hmi.web.roles import Right
 from hmi.web.sessions import Caller
-from station.channel.panel_live import PersonNoted
+from station.channel.panel_run import PersonNoted
 from station.messages.message import Message
 from station.settings.configuration import check_configuration
 from station.settings.problems import SettingsError

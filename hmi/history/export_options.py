@@ -2,7 +2,7 @@
 
 from datetime import UTC, datetime
 
-from station.channel.panel_queries import Search
+from station.channel.panel_lots import Search
 from station.errors import BadInputError
 from station.messages import jobs as messages
 

@@ -23,7 +23,7 @@ from hmi.web.page import go_to, show
 from hmi.web.problem import Problem
 from hmi.web.translation import Locale
 from station.channel.line import Noted
-from station.channel.panel_queries import NoteExport, Search
+from station.channel.panel_lots import NoteExport, Search
 from station.charts.area_chart import Curve, Limit, Mark
 from station.charts.spark import spark
 from station.messages.reasons import reason_message

@@ -26,16 +26,7 @@ from hmi.web.roles import Right
 from hmi.web.sessions import Caller
 from hmi.web.translation import Locale
 from station.channel.messages import ChannelError, RefusedError
-from station.channel.panel_live import (
-    GetRecipes,
-    OperatorCommand,
-    OperatorCommandName,
-    OperatorCommandView,
-    PanelState,
-    PersonNoted,
-    Recipes,
-)
-from station.channel.panel_maintenance_queries import (
+from station.channel.panel_maintenance import (
     CalibrationRunView,
     CalibrationState,
     ContinueCalibrationRun,
@@ -45,6 +36,7 @@ from station.channel.panel_maintenance_queries import (
     GetLiveImage,
     GetRegisters,
     Health,
+    ImageFile,
     Jogged,
     JogGripper,
     LedsSet,
@@ -55,7 +47,15 @@ from station.channel.panel_maintenance_queries import (
     SetLeds,
     StartCalibrationRun,
 )
-from station.channel.panel_queries import Picture
+from station.channel.panel_run import (
+    GetRecipes,
+    OperatorCommand,
+    OperatorCommandName,
+    OperatorCommandView,
+    PanelState,
+    PersonNoted,
+    Recipes,
+)
 
 router = APIRouter(prefix="/maintenance")
 ENTRY = Entry("maintenance", "/maintenance")
@@ -290,7 +290,7 @@ async def log(request: Request, hmi: HmiNow, level: Annotated[Level, Query()] = 
 
 _OLD_IMAGE_S = 2.0
 """An image is shown as live up to this age, as are all values of the pages."""
-_FRAMES: OrderedDict[str, Picture] = OrderedDict()
+_FRAMES: OrderedDict[str, ImageFile] = OrderedDict()
 """The last live images: a page gets the address of one, and then fetches it."""
 
 

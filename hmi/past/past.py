@@ -17,7 +17,7 @@ from hmi.past.pictures import Stages, read_image, read_stages
 from hmi.past.recipes import PastRecipes
 from hmi.past.tried import Tried, read_tried
 from hmi.past.worker import PastWorker
-from station.channel.panel_queries import LotView, Search
+from station.channel.panel_lots import LotView, Search
 from station.channel.worker import PanelBusyError
 from station.inspection.alarm_table import ALARMS
 from station.messages.message import Message, message_in, verbatim

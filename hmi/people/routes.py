@@ -15,7 +15,7 @@ from hmi.web.problem import Problem
 from hmi.web.roles import Right, Role
 from hmi.web.sessions import Caller
 from hmi.web.user_store import UserStoreError, least_digits
-from station.channel.panel_live import PersonNoted
+from station.channel.panel_run import PersonNoted
 from station.serving.guard import is_this_machines
 
 router = APIRouter()

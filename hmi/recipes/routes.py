@@ -26,7 +26,7 @@ from hmi.web.sessions import Caller
 from hmi.web.translation import Locale
 from station.channel.line import Noted
 from station.channel.messages import RefusedError
-from station.channel.panel_recipe_orders import (
+from station.channel.panel_recipes import (
     LARGEST_TEXT,
     ApproveRecipe,
     ImportedRecipe,

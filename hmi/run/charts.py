@@ -6,7 +6,7 @@ from markupsafe import Markup, escape
 
 from hmi.common.charts import area_over_closing, mark_decided
 from hmi.web.translation import Locale
-from station.channel.panel_live import Fruit, FruitSummary
+from station.channel.panel_run import Fruit, FruitSummary
 from station.charts.area_chart import Curve, Limit, Mark, Size
 
 TREND_BUCKET = 10

@@ -23,7 +23,7 @@ from hmi.web.roles import Right
 from hmi.web.sessions import Caller
 from hmi.web.translation import Locale
 from station.channel.messages import RefusedError
-from station.channel.panel_live import (
+from station.channel.panel_run import (
     Fruit,
     FruitSummary,
     GetFruit,

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
-from station.channel.panel_live import FruitSummary, PanelState, Recent
+from station.channel.panel_run import FruitSummary, PanelState, Recent
 from station.messages.message import Message
 
 DEVICES = ("gripper", "arm", "camera")

@@ -32,7 +32,7 @@ from hmi.web.sessions import Sessions
 from hmi.web.streams import MOST_STREAMS, RESERVED_STREAMS
 from hmi.web.user_store import FOLDER, UserStore
 from station.channel.messages import ChannelError, DeadlineError
-from station.channel.panel_live import PersonNoted
+from station.channel.panel_run import PersonNoted
 from station.errors import StationError
 from station.messages.message import Message
 from station.serving.places import Places

@@ -14,7 +14,7 @@ from station.channel.client import ChannelClient
 from station.channel.line import Noted
 from station.channel.messages import ChannelError, ChannelMessage, DeadlineError, RefusedError
 from station.channel.panel import Actor
-from station.channel.panel_live import Fruit, GetFruit, GetPanelState, GetRecent, PanelState, PersonNoted, Recent
+from station.channel.panel_run import Fruit, GetFruit, GetPanelState, GetRecent, PanelState, PersonNoted, Recent
 from station.errors import StationError
 
 ReplyT = TypeVar("ReplyT", bound=ChannelMessage)

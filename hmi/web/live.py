@@ -14,7 +14,7 @@ from hmi.web.roles import RIGHTS, Right, Role
 from hmi.web.sessions import Caller
 from hmi.web.streams import Stream
 from hmi.web.translation import Locale
-from station.channel.panel_live import PanelState
+from station.channel.panel_run import PanelState
 from station.serving.places import Places
 from station.settings.hmi import Language
 

@@ -16,7 +16,7 @@ from station.settings.last_good import load_or_last_good
 
 @click.group("plc")
 def plc() -> None:
-    """Talk to the line's PLC, and make its documents."""
+    """Serve the PLC interface, and export its documents."""
 
 
 plc.add_command(check_can)

@@ -89,8 +89,7 @@ class ChannelClient:
                 await self._socket.send_multipart([envelope, name.encode(), request.model_dump_json().encode()])
                 status, body = await answer
         except TimeoutError:
-            purpose = request.purpose or f"for {name}"
-            raise DeadlineError(messages.NO_ANSWER(peer=self._peer, limit_s=deadline_s, purpose=purpose)) from None
+            raise DeadlineError(messages.NO_ANSWER(peer=self._peer, request=name, limit_s=deadline_s)) from None
         except zmq.ZMQError as error:
             raise ChannelError(messages.CHANNEL_CLOSED(peer=self._peer)) from error
         finally:

@@ -6,13 +6,13 @@ either side `Resume` returns the inspections that are accepted and not yet ackno
 """
 
 from enum import StrEnum
-from typing import ClassVar, Literal
+from typing import Literal
 
 from pydantic import Field
 
 from station.channel.messages import ChannelMessage
 from station.messages.message import Message
-from station.vocabulary import OutcomeName, PackmlState, Reason, Refusal
+from station.vocabulary import LONGEST_LOT, OutcomeName, PackmlState, Reason, Refusal
 
 
 class CommandName(StrEnum):
@@ -59,7 +59,7 @@ class Outcome(ChannelMessage):
     """By the monotonic clock; 0 where it is not known, as of a station that was killed."""
     encoder: int = Field(ge=0, lt=2**32)
     """The line's encoder at the trigger, as given with `Begin`."""
-    lot: str = Field(max_length=32)
+    lot: str = Field(max_length=LONGEST_LOT)
     fruit_length_mm_x10: int = Field(default=0, ge=0, le=65_535)
     """The fruit's length as given with `Begin`; 0 where none was, and in outcomes of versions without it."""
     size_class: int = Field(default=0, ge=0, le=65_535)
@@ -69,10 +69,9 @@ class Outcome(ChannelMessage):
 class Begin(ChannelMessage):
     """Inspect one fruit. Answered once the trigger is durable, before anything moves."""
 
-    purpose: ClassVar[str] = "to begin an inspection"
     trigger_id: int = Field(ge=1, le=65_535)
     encoder: int = Field(ge=0, lt=2**32)
-    lot: str = Field(max_length=32)
+    lot: str = Field(max_length=LONGEST_LOT)
     fruit_length_mm_x10: int = Field(default=0, ge=0, le=65_535)
     """Length from stem to tip, tenths of a millimetre, as the line's grader measured it; 0 where none is given."""
     size_class: int = Field(default=0, ge=0, le=65_535)
@@ -93,28 +92,23 @@ class BeginReply(ChannelMessage):
 class AwaitOutcome(ChannelMessage):
     """Wait for the outcome of an accepted inspection."""
 
-    purpose: ClassVar[str] = "for an inspection's outcome"
     sequence: int = Field(ge=1, lt=2**32)
 
 
 class Published(ChannelMessage):
     """The PLC can read this outcome now. It is final, also against another one that the station holds."""
 
-    purpose: ClassVar[str] = "to note what the PLC was told"
     outcome: Outcome
 
 
 class Acknowledged(ChannelMessage):
     """The PLC has taken the outcomes up to this sequence."""
 
-    purpose: ClassVar[str] = "to note an acknowledgement"
     sequence: int = Field(ge=0, lt=2**32)
 
 
 class Resume(ChannelMessage):
     """Query the open inspections, after a start or a lost connection."""
-
-    purpose: ClassVar[str] = "what is open"
 
 
 class Open(ChannelMessage):
@@ -150,7 +144,6 @@ class LineFault(ChannelMessage):
 class Line(ChannelMessage):
     """State of the line at the interface, sent with every beat, for the station's alarms, metrics and pages."""
 
-    purpose: ClassVar[str] = "for the station's state"
     plc_connected: bool
     plc_alive: bool
     """The PLC's heartbeat changes in time."""
@@ -199,7 +192,6 @@ class StationState(ChannelMessage):
 class Command(ChannelMessage):
     """Execute a command of the PLC; answered when it is done."""
 
-    purpose: ClassVar[str] = "to carry out a command"
     command: CommandName
     argument: int = Field(ge=0, le=65_535)
 

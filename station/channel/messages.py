@@ -1,14 +1,13 @@
 """Base of all messages on a channel, and the channel's errors."""
 
 import struct
-from typing import ClassVar
 
 from pydantic import BaseModel, ConfigDict
 
 from station.errors import BadInputError, StationError
 
 ENVELOPE = struct.Struct(">Qd")
-"""The request's number, and the end of its life on the machine's monotonic clock, which all its processes share."""
+"""The request's number, and its deadline on the monotonic clock that all processes of a machine share, s."""
 
 LARGEST_MESSAGE_BYTES = 16 * 1024 * 1024
 
@@ -17,8 +16,6 @@ class ChannelMessage(BaseModel):
     """A request or a reply: strict, frozen, nothing unknown. Its class name is its name on the wire."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-    purpose: ClassVar[str] = ""
-    """The request as an operator reads it, continuing "when asked"; empty for the class name."""
 
 
 class ChannelError(StationError):

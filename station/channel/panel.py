@@ -1,6 +1,6 @@
 """Requests of a person at the cell: recovery and alarms."""
 
-from typing import ClassVar, Literal
+from typing import Literal
 
 from pydantic import Field
 
@@ -23,14 +23,11 @@ class Recover(ChannelMessage):
     It enables the arm, and moves nothing; the station continues only after a reset.
     """
 
-    purpose: ClassVar[str] = "to bring the arm back"
     what: RecoveryName
 
 
 class ListAlarms(ChannelMessage):
     """Query the alarms that are not in their normal state. Answered with `AlarmList`."""
-
-    purpose: ClassVar[str] = "for its alarms"
 
 
 class ListedAlarm(ChannelMessage):
@@ -81,13 +78,10 @@ class AlarmAction(ChannelMessage):
 class AcknowledgeAlarm(AlarmAction):
     """Acknowledge an alarm. Idempotent."""
 
-    purpose: ClassVar[str] = "to acknowledge an alarm"
-
 
 class ShelveAlarm(AlarmAction):
     """Shelve an alarm, in the list and for the PLC; refused for a latched one and for one that is shelved."""
 
-    purpose: ClassVar[str] = "to shelve an alarm"
     reason: str = Field(max_length=1000)
     """The reason; never empty."""
     for_s: float = Field(gt=0, allow_inf_nan=False)
@@ -96,5 +90,3 @@ class ShelveAlarm(AlarmAction):
 
 class UnshelveAlarm(AlarmAction):
     """Unshelve an alarm before its time is over. Idempotent."""
-
-    purpose: ClassVar[str] = "to show a shelved alarm again"

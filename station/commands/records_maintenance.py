@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 from sqlalchemy import Connection, exists, select
 
-from station.channel.panel_queries import LotView
+from station.channel.panel_lots import LotView
 from station.clock import formatted
 from station.commands.records_options import by_option, folder_of, proof_options, public_keys_option
 from station.commands.site import site_or_last_good

@@ -139,11 +139,16 @@ _ORDER = {priority: place for place, priority in enumerate(Priority)}
 
 
 def urgency(alarm: AlarmId) -> tuple[int, int]:
-    """What to sort by, the most urgent first: priority, then number."""
+    """Sort key, most urgent first: priority, number."""
     row = ALARMS[alarm]
     return _ORDER[row.priority], row.number
 
 
+def heading(alarm: AlarmId) -> str:
+    """Anchor of the alarm's heading, as Git hosts make it."""
+    return alarm.value.replace("_", "-")
+
+
 def anchor(alarm: AlarmId) -> str:
-    """Where its document explains it."""
-    return f"docs/alarms.md#{alarm.value.replace('_', '-')}"
+    """Address of the alarm's document."""
+    return f"docs/alarms.md#{heading(alarm)}"

@@ -1,6 +1,6 @@
 """The life of alarms as values: what is active, seen, shelved, latched (ANSI/ISA-18.2-2016, alarm states)."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, Self
@@ -8,7 +8,7 @@ from typing import Any, Self
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from station.inspection.alarm_table import ALARMS, AlarmId, urgency
-from station.messages.message import Message, message_in
+from station.messages.message import Message
 
 LONGEST_SHELVED_S = 8 * 3600.0
 """One shift: what is hidden for longer is not an alarm."""
@@ -17,7 +17,7 @@ CHATTER_RAISES, CHATTER_S = 3, 60.0
 
 
 class AlarmState(StrEnum):
-    """Where one alarm is."""
+    """State of one alarm (ISA-18.2)."""
 
     NORMAL = "normal"
     UNACKNOWLEDGED = "unacknowledged"
@@ -25,7 +25,7 @@ class AlarmState(StrEnum):
     RETURNED = "returned"
     """The cause is gone, and nobody has acknowledged it yet."""
     LATCHED_UNACKNOWLEDGED = "latched_unacknowledged"
-    """The cause is gone, but it stands until a person has reset it."""
+    """The cause is gone, but it stays active until a person has reset it."""
     LATCHED = "latched"
     """Likewise, acknowledged."""
     SHELVED = "shelved"
@@ -35,7 +35,7 @@ class AlarmState(StrEnum):
 
 
 class AlarmEvent(StrEnum):
-    """What happens to an alarm."""
+    """Event of an alarm."""
 
     RAISED = "raised"
     RETURNED = "returned"
@@ -136,7 +136,7 @@ class Alarms:
         was = self.get(alarm)
         if was.state in CAUSED and was.quiet_since_s is None:
             return self._with(replace(was, detail=detail))
-        told = replace(
+        again = replace(
             was,
             detail=detail,
             since_s=was.since_s if was.state in CAUSED else now_s,
@@ -144,7 +144,7 @@ class Alarms:
             raises_s=(*was.raises_s, now_s)[-CHATTER_RAISES:],
             quiet_since_s=None,
         )
-        return self._with(_moved(told, E.RAISED))
+        return self._with(_moved(again, E.RAISED))
 
     def returned(self, alarm: AlarmId, now_s: float) -> Self:
         """Its cause is gone; a chattering one stays until it has not come for a while (`tick`)."""
@@ -216,14 +216,9 @@ class Alarms:
         """The number of the most urgent active alarm, 0 for none."""
         return ALARMS[self.active[0].id].number if self.active else 0
 
-    def to_data(self) -> list[dict[str, Any]]:
-        """Plain data to remember over a restart."""
-        return [_ROW.dump_python(alarm, mode="json") for alarm in self.known.values()]
-
     @classmethod
-    def from_data(cls, data: object) -> Self:
-        """What `to_data` gave, also through JSON; rows that mean nothing any more are left out."""
-        rows = data if isinstance(data, list) else []
+    def restored(cls, rows: Iterable[Mapping[str, Any]]) -> Self:
+        """Return the alarms of stored rows; a row with an id or state that this version does not know is left out."""
         alarms = [alarm for row in rows if (alarm := _alarm(row)) is not None]
         return cls({alarm.id: alarm for alarm in alarms})
 
@@ -262,10 +257,8 @@ def _returned_for_good(alarm: Alarm) -> Alarm:
 _ROW = TypeAdapter(Alarm)
 
 
-def _alarm(row: object) -> Alarm | None:
+def _alarm(row: Mapping[str, Any]) -> Alarm | None:
     """A remembered alarm; None where its id is no longer known, or its state is none of its life's."""
-    if isinstance(row, dict) and isinstance(row.get("detail"), str):  # of versions before messages
-        row = {**row, "detail": message_in(row["detail"])}
     try:
         alarm = _ROW.validate_python(row)
     except ValidationError:

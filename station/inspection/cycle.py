@@ -15,7 +15,7 @@ from station.vocabulary import Reason
 
 
 class Event(StrEnum):
-    """What happened."""
+    """Event of the cycle: a finished action, a fault, or a request."""
 
     READY = "ready"
     """Every device that an inspection needs answers, is able and was read just now; the records can be written."""
@@ -51,7 +51,7 @@ class Event(StrEnum):
     RESET = "reset"
     """By the PLC's command, at the panel, or by the service itself where the settings let it."""
     STOP = "stop"
-    """An orderly stop; asked for again by `CHECK_DEVICES` while it stands."""
+    """An orderly stop; `CHECK_DEVICES` repeats it while it is in force."""
     CALLED_OFF = "called_off"
     LATE = "late"
     """The inspection's deadline passed. A single wait's deadline is the device's fault."""
@@ -73,10 +73,10 @@ class Event(StrEnum):
 
 
 class Action(StrEnum):
-    """What the service has to do, and the events that it ends with beside the faults."""
+    """Action of the service, with the events that end it, besides faults."""
 
     READ_DEVICES = "read_devices"
-    """Read every device until all answer: READY, or the stop that stands."""
+    """Read every device until all answer: READY, or the active stop."""
     CLOSE_UNFINISHED = "close_unfinished"
     """Give every accepted trigger that has no durable outcome its NO_RESULT, durable, and publish every outcome that
     was not: UNFINISHED_CLOSED. Idempotent."""
@@ -138,7 +138,7 @@ Act = Action | Raise
 
 
 class Transition(NamedTuple):
-    """Where an event leads, and what is to be done, in this order."""
+    """Next state, and the actions in their order."""
 
     state: State
     actions: tuple[Act, ...] = ()
@@ -201,6 +201,7 @@ ACCEPTING = (S.ACCEPTING, S.RETREATING_ACCEPTING)
 UNRECORDED = (S.OPENING_UNRECORDED, S.HOMING_UNRECORDED)
 GETTING_READY = (S.CLEARING, S.RESETTING, S.HOMING, S.CHECKING)
 WAITING = (S.UNKNOWN, S.STOPPED, S.HELD, S.CARRIED, S.LATCHED)
+WAITING_FOR_DEVICES = (S.UNKNOWN, S.HELD)
 
 MOTION_FAULTS = (E.ARM_FAULT, E.GRIPPER_FAULT)
 FAULTS = (*MOTION_FAULTS, E.CAMERA_FAULT, E.RECORDS_FAULT, E.INTERNAL_FAULT)
@@ -217,19 +218,19 @@ _HOLD = (A.HALT, A.READ_DEVICES)
 def _latched() -> Iterable[Row]:
     """The stops that a person has to confirm: nothing moves any more, and what is open becomes NO_RESULT."""
     for event, alarm in LATCHES.items():
-        told, stopped = Raise(alarm), (A.HALT, Raise(alarm))
-        yield Row(UNJUDGED, (event,), S.RECORDING_LATCHED, (*_NO_RESULT, told))
+        raised, stopped = Raise(alarm), (A.HALT, Raise(alarm))
+        yield Row(UNJUDGED, (event,), S.RECORDING_LATCHED, (*_NO_RESULT, raised))
         yield Row((*RECORDING, S.RECORDING_HELD), (event,), S.RECORDING_LATCHED, stopped)
         yield Row((*PLACING, S.RELEASING, *LEAVING, S.OPENING_HELD), (event,), S.LATCHED, stopped)
         yield Row((*UNRECORDED, *GETTING_READY, S.RECOVERING), (event,), S.LATCHED, stopped)
         yield Row(ACCEPTING, (event,), S.LATCHED, (A.REFUSE_TRIGGER, *stopped))
         yield Row((S.UNKNOWN, S.STOPPED, S.IDLE, S.HELD, S.CARRIED), (event,), S.LATCHED, stopped)
-        yield Row((S.RECORDING_LATCHED, S.LATCHED), (event,), None, (told,))
+        yield Row((S.RECORDING_LATCHED, S.LATCHED), (event,), None, (raised,))
 
 
 ROWS: tuple[Row, ...] = (
     # From a start, or after a fault, to the first trigger.
-    Row((S.UNKNOWN, S.HELD), (E.READY,), S.CLEARING, (A.CLOSE_UNFINISHED,)),
+    Row(WAITING_FOR_DEVICES, (E.READY,), S.CLEARING, (A.CLOSE_UNFINISHED,)),
     Row((S.CLEARING,), (E.UNFINISHED_CLOSED,), S.STOPPED),
     Row((S.STOPPED,), (E.RESET,), S.RESETTING, (A.OPEN_JAWS,)),
     Row((S.RESETTING,), (E.JAWS_OPEN,), S.HOMING, (A.GO_HOME,)),
@@ -291,7 +292,7 @@ ROWS: tuple[Row, ...] = (
     Row((S.OPENING_HELD,), (E.JAWS_OPEN, E.GRIPPER_FAULT, E.INTERNAL_FAULT), S.HELD, _HOLD),
     Row((S.RELEASING, *LEAVING), (*MOTION_FAULTS, E.INTERNAL_FAULT), S.HELD, _HOLD),
     Row(PLACING, (*MOTION_FAULTS, E.INTERNAL_FAULT), S.CARRIED, (A.HALT, Raise(AlarmId.FRUIT_HELD))),
-    # The outcome cannot be made durable: it is not told, and is closed as NO_RESULT once the records are back.
+    # The outcome cannot be made durable: it is not published, and is closed as NO_RESULT once the records are back.
     Row(RECORDING, (E.RECORDS_FAULT, E.INTERNAL_FAULT), S.OPENING_UNRECORDED, (A.OPEN_JAWS,)),
     Row((S.OPENING_UNRECORDED,), (E.JAWS_OPEN,), S.HOMING_UNRECORDED, (A.GO_HOME,)),
     Row((S.HOMING_UNRECORDED,), (E.HOME,), S.HELD, _HOLD),
@@ -338,7 +339,7 @@ TABLE: dict[tuple[State, Event], Transition] = _table(ROWS)
 
 
 def hold_after(event: Event, state: State, before: Event | None, *, carries: bool) -> Event | None:
-    """What has to be durable before a state is shown, so that nothing but a person leads on, whatever is killed.
+    """Return the hold to store before a state is shown, so that only a person can continue after a crash.
 
     Args:
         event: what led to the state.
@@ -356,7 +357,7 @@ def hold_after(event: Event, state: State, before: Event | None, *, carries: boo
 
 
 class Cycle:
-    """One station's cycle: the state, and what was refused.
+    """State of one station's cycle, and counts of refused events.
 
     Args:
         hold: what `hold_after` gave last in the process before.

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from station.errors import BadInputError
 from station.inspection.cycle import Event
+from station.inspection.press import FINEST_STEP_MM
 from station.inspection.second_press import FREED_BY_MM
 from station.inspection.states import State
 from station.messages.operation import INSPECTION_TOO_LONG as TOO_LONG
@@ -16,15 +17,15 @@ deviations cancel, so the whole is known better than its parts."""
 GRACE_S = 1.0
 """Added to each: a busy machine's scheduler, and a gripper's or an arm's answer."""
 LONGEST_S = 600.0
-"""What the PLC can be told."""
-OVERSHOOT_MM = 1.0
-"""From where the moving fingers met the fruit to where they stopped; 0.6 on the twin (docs/cycle-time.md)."""
-COUNT_MM = 0.4
-"""The fingers' finest step."""
+"""Longest deadline that the PLC interface accepts (`BeginReply.deadline_s`), s, without the time to record it."""
+OVERSHOOT_MM = 1.2
+"""Largest travel from the first frame with a contact to the stop, mm; measured on the twin (docs/cycle-time.md)."""
+
 _RAMP_S = 0.2
 """Acceleration, braking and arrival of one motion of the gripper; 9 ms on the twin (docs/gripper.md), with room for
 fingers that have mass and for a slow line. Unverified on hardware."""
 _SLOWEST_OPENING_MM_S = 20.0
+"""The 2F-85's slowest speed, mm/s."""
 _CENTRING_S = 0.5
 """A few millimetres of the tool; 0.2 s on the twin. Unverified on hardware."""
 _RECOVERY_S = 20.0
@@ -32,7 +33,7 @@ _RECOVERY_S = 20.0
 
 
 class Pace(NamedTuple):
-    """What the times of one cell follow from."""
+    """Speeds and durations of one cell."""
 
     frames_per_s: float
     arm_move_s: float
@@ -125,7 +126,7 @@ def deadlines(recipe: Recipe, pace: Pace) -> Deadlines:
     """The deadlines of a recipe's inspection on a cell.
 
     Raises:
-        BadInputError: the inspection would take longer than the PLC can be told.
+        BadInputError: the inspection would take longer than the longest deadline that the PLC interface accepts.
     """
     expected_s = _expected(recipe, pace)
     longest_path_s = _longest_path_s(recipe, pace)
@@ -144,12 +145,13 @@ def _longest_path_s(recipe: Recipe, pace: Pace) -> float:
     expected = recipe.expected_width
     sweep_s = (min(expected.largest_mm, pace.stroke_mm) - expected.smallest_mm + step_mm) / speed_mm_s + _RAMP_S
     # Back to where nothing touches, then count by count with one frame each, and once more with all.
-    glances = ceil(OVERSHOOT_MM / COUNT_MM) + 1
+    glances = ceil(OVERSHOOT_MM / FINEST_STEP_MM) + 1
     onset_s = _RAMP_S + glances * (_RAMP_S + pace.measure_s) + (glances - 1) / pace.frames_per_s + capturing_s
-    limits_mm = recipe.damage.area[-1].closing_mm
-    steps = min(recipe.steps.number, ceil(limits_mm / step_mm)) if recipe.steps.stop_when_decided else None
+    steps = recipe.steps.number
+    if recipe.steps.stop_when_decided:
+        steps = min(steps, ceil(recipe.damage.area[-1].closing_mm / step_mm))
     step_s = max(step_mm / speed_mm_s + _RAMP_S + recipe.imaging.settle_s + capturing_s, pace.measure_s)
-    press_s = (recipe.steps.number if steps is None else steps) * step_s + 2 * pace.measure_s
+    press_s = steps * step_s + 2 * pace.measure_s
     # The jaws open beside the fruit, the sensor moves, and the jaws close again to where it was met.
     again_s = 2 * (FREED_BY_MM / speed_mm_s + _RAMP_S) + (_CENTRING_S if pace.arm_way_s else 0.0) + onset_s
     centrings = 0 if recipe.press.centre_from_mm is None or not pace.arm_way_s else 1
@@ -165,7 +167,7 @@ def _longest_path_s(recipe: Recipe, pace: Pace) -> float:
 
 
 def late(limits: Deadlines, state: State, in_state_s: float, since_trigger_s: float | None) -> Late | None:
-    """What is late now, the inspection before the phase.
+    """Return the deadline that has passed, if any; the inspection's is checked before the phase's.
 
     Args:
         limits: from `deadlines`.
@@ -182,7 +184,7 @@ def late(limits: Deadlines, state: State, in_state_s: float, since_trigger_s: fl
 
 
 def _expected(recipe: Recipe, pace: Pace) -> dict[State, float]:
-    """What a state takes where all is well; what is not listed takes a moment."""
+    """Return each state's expected duration, s; a state that is not listed takes no time."""
     steps, imaging = recipe.steps, recipe.imaging
     without_stop_mm = recipe.damage.passing_closing_mm if steps.measured == "while_closing" else 0.0
     moving_s = max(steps.step_mm, without_stop_mm) / recipe.gripper.speed_mm_s + _RAMP_S

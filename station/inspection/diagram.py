@@ -35,7 +35,7 @@ COLUMNS: tuple[tuple[str, dict[State, int]], ...] = (
         },
     ),
     (
-        "while the step before is measured",
+        "centring; measuring the step before",
         {
             State.CENTRING: 1,
             State.OPENING_AGAIN: 2,

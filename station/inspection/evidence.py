@@ -12,14 +12,14 @@ from math import hypot
 from statistics import median
 
 from station.inspection.monotone import wrong_frames
-from station.inspection.press import RELATIVE_NOISE, Measured, Press
+from station.inspection.press import Measured, Press
 from station.inspection.sized_limits import SizedLimits
 from station.inspection.uncertainty import Budget, budget_at
 from station.vocabulary import Flag
 
 LIGHT_TOUCH = 0.5
 """Below this share of the first damage threshold's closing a contact is too light to say anything for or against: a
-seed is outlined in place of the body (docs/robust.md, limits)."""
+seed is outlined in place of the contact (docs/robust.md, limits)."""
 
 AT_MM = 0.03
 """So little short of a damage threshold's closing, a step is at it: eight counts of the gripper are 2.996 mm.
@@ -128,7 +128,7 @@ class Evidence:
         areas = [point.area_mm2 for point in self.judged]
         least_noise = _LEAST_NOISE * self._recipe.damage.area[-1].area_mm2
         widths = [-point.closing_mm for point in self.judged]
-        return [self.judged[wrong.index] for wrong in wrong_frames(widths, areas, RELATIVE_NOISE, least_noise)]
+        return [self.judged[wrong.index] for wrong in wrong_frames(widths, areas, least_noise=least_noise)]
 
     def area_at(self, closing_mm: float) -> tuple[float, float] | None:
         """Area and expanded uncertainty, mm², between the points around a closing above 0; None if not reached."""
@@ -136,7 +136,7 @@ class Evidence:
         return None if found is None else self._with_uncertainty(closing_mm, *found)
 
     def budget_at(self, closing_mm: float) -> Budget:
-        """What the uncertainty of an area at a closing above 0 is made of."""
+        """Return the uncertainty budget of an area at a closing above 0."""
         if closing_mm not in self._budgets:  # each is asked for by all that is judged of one closing
             self._budgets[closing_mm] = budget_at(closing_mm, self._press, self._limits)
         return self._budgets[closing_mm]
@@ -177,7 +177,7 @@ class Evidence:
 
     @property
     def begins_at_mm(self) -> float | None:
-        """Where the needed points' own line starts from no area; None where they show none.
+        """Closing at which the line through the needed points has no area; None without such a line.
 
         Where points are excused, the trusted ones have to show it too, with the first beyond the needed ones: the later
         of both begins.

@@ -6,7 +6,7 @@ The documents of the cycle and of the alarms with the cycle's drawing; a test co
 from collections.abc import Iterable
 from pathlib import Path
 
-from station.inspection.alarm_table import ALARMS, PRIORITIES, AlarmId, Priority
+from station.inspection.alarm_table import ALARMS, PRIORITIES, AlarmId, Priority, heading
 from station.inspection.alarms import (
     CHATTER_RAISES,
     CHATTER_S,
@@ -54,7 +54,7 @@ active: bit number - 1 of the register `alarms`, or for the numbers from 33 on b
 
 
 def exported(root: Path = ROOT) -> dict[Path, str]:
-    """What each file of the checkout has to hold."""
+    """Return the content of each exported file."""
     documents = root / "docs"
     return {
         documents / "cycle.md": cycle_document(),
@@ -98,10 +98,7 @@ def alarms_document() -> str:
         ALARM,
         _table(
             ("number", "alarm", "priority"),
-            (
-                (str(row.number), f"[`{alarm}`](#{_heading(alarm)})", row.priority.value)
-                for alarm, row in ALARMS.items()
-            ),
+            ((str(row.number), f"[`{alarm}`](#{heading(alarm)})", row.priority.value) for alarm, row in ALARMS.items()),
         ),
         _table(("priority", "means", "alarms"), map(_priority, Priority)),
         *(part for alarm in ALARMS for part in _alarm(alarm)),
@@ -157,7 +154,7 @@ def _acts(actions: Iterable[Act], own: AlarmId | None = None) -> str:
 
 
 def _alarm_link(alarm: AlarmId) -> str:
-    return f"[`{alarm}`](alarms.md#{_heading(alarm)})"
+    return f"[`{alarm}`](alarms.md#{heading(alarm)})"
 
 
 def _priority(priority: Priority) -> tuple[str, ...]:
@@ -169,11 +166,6 @@ def _alarm(alarm: AlarmId) -> Iterable[str]:
     yield f"## {alarm.value.replace('_', ' ')}\n"
     yield f"Number {row.number}, {row.priority}{', latched' if row.latched else ''}.\n"
     yield f"- Cause: {row.cause}\n- Consequence: {row.consequence}\n- Action: {row.action}\n"
-
-
-def _heading(alarm: AlarmId) -> str:
-    """A heading's anchor, as Git hosts make it."""
-    return alarm.value.replace("_", "-")
 
 
 def _life(life: dict[tuple[AlarmState, AlarmEvent], AlarmState]) -> str:

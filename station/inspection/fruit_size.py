@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class FruitSize:
-    """What the PLC wrote about the fruit's size; unchecked, since only a recipe knows what is possible."""
+    """Size of a fruit as the PLC wrote it; unchecked, because only a recipe knows the possible values."""
 
     length_mm: float | None = None
     """Length from stem to tip, mm; None where the PLC gave none (register 0)."""
@@ -14,4 +14,4 @@ class FruitSize:
 
 
 NO_SIZE = FruitSize()
-"""What a PLC tells that writes none."""
+"""Size of a fruit for which the PLC gave none."""

@@ -1,8 +1,8 @@
 """The judge: a press and its recipe → PASS, FAIL or NO_RESULT, with a message for every reason.
 
-PASS is said only of a fruit all of whose limits were measured, by trusted points, to be kept with the uncertainty on
-top. FAIL needs a trusted proof. All else is NO_RESULT, which the line diverts like FAIL. Why the lines are drawn as
-they are: docs/decisions/0015 and 0057.
+PASS requires that every limit was measured by trusted points and is kept with the uncertainty added. FAIL requires a
+trusted proof. Everything else is NO_RESULT, which the line diverts like FAIL. Why the lines are drawn as they are:
+docs/decisions/0015 and 0057.
 """
 
 from collections.abc import Iterator, Sequence
@@ -37,7 +37,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """Why no further step is made."""
+    """Reason to make no further step."""
 
     message: Message
     finding: Finding | None = None
@@ -253,7 +253,7 @@ class _Case:
 
     @cached_property
     def stopped(self) -> Stop | None:
-        """Why no further step is made."""
+        """Reason to make no further step; None if one is made."""
         if not self.evidence.points:
             return None
         if self.limits.recipe.steps.stop_when_decided and (why := self._decided()):
@@ -314,7 +314,7 @@ def _hopeless(evidence: Evidence, recipe: Recipe) -> Finding | None:
 
 
 def _void(press: Press, limits: SizedLimits) -> Iterator[Finding]:
-    """What makes the measurement no measurement of this recipe's fruit: nothing in it is a proof."""
+    """Yield the findings that make the whole press invalid: nothing in it proves damage."""
     recipe = limits.recipe
     for reason in dict.fromkeys(press.interruptions):
         known = _INTERRUPTED.get(reason)
@@ -393,7 +393,7 @@ def limit_message(limit_mm2: float, limits: SizedLimits) -> Message:
 
 
 def _distrust(evidence: Evidence, recipe: Recipe) -> Iterator[Finding]:
-    """What a PASS would need and does not have."""
+    """Yield the reasons why the measurement is not trusted."""
     needed = [point for point in evidence.needed if point not in evidence.excused]
     for flag, (reason, said) in _DOUBTS.items():
         if doubtful := [point for point in needed if flag in evidence.doubts(point)]:

@@ -9,6 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+RELATIVE_NOISE = 0.05
+"""By how much of itself an area may fall while the gripper closes before its step is called wrong; docs/measurement.md
+has the method's median errors, 0.04 to 0.06 on smooth fruit. The guard band of a limit is in uncertainty.py."""
+
 
 @dataclass(frozen=True, slots=True)
 class WrongFrame:
@@ -23,7 +27,10 @@ class WrongFrame:
 
 
 def wrong_frames(
-    widths_mm: Sequence[float], areas: Sequence[float], relative_noise: float = 0.05, least_noise: float = 0.0
+    widths_mm: Sequence[float],
+    areas: Sequence[float],
+    relative_noise: float = RELATIVE_NOISE,
+    least_noise: float = 0.0,
 ) -> list[WrongFrame]:
     """The fewest frames without which the area never shrinks, within noise, while the width does.
 

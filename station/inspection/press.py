@@ -6,9 +6,8 @@ from math import isfinite
 from station.inspection.fruit_size import NO_SIZE, FruitSize
 from station.vocabulary import Flag, Reason
 
-RELATIVE_NOISE = 0.05
-"""By how much of itself an area may fall while the gripper closes before its step is called wrong; docs/measurement.md
-has the method's median errors, 0.04 to 0.06 on smooth fruit. The guard band of a limit is in uncertainty.py."""
+FINEST_STEP_MM = 0.4
+"""A step that surely moves the gripper by one count, which is 85 mm / 227 = 0.37 mm on a 2F-85."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +22,8 @@ class Measured:
     """0 to 1; None where the method does not say, which is no trust."""
     flags: frozenset[Flag] = frozenset()
     changed_area_mm2: float | None = None
-    """The second witness: how much of the image has changed; None where the method does not say. No criterion."""
+    """Area in which the image differs from the reference; None where the method does not measure it. The judge does not
+    use it."""
     changed_area_px: int | None = None
     area_scatter_mm2: float = 0.0
     """How far the areas of steps that share this closing differ; `area_mm2` is the largest of them."""
@@ -49,7 +49,7 @@ class Press:
     interruptions: tuple[Reason, ...] = ()
     """What ended the steps or spoilt them from outside the measurement: a fault, called off, late, a bad reference."""
     size: FruitSize = NO_SIZE
-    """What the line's PLC told of the fruit."""
+    """The fruit's size as the PLC gave it."""
     resolution_mm: float = 0.0
     """Of the measured widths: one count of the gripper, mm."""
     scale_uncertainty: float = 0.0

@@ -43,9 +43,9 @@ def sized_limits(press: Press, recipe: Recipe) -> SizedLimits:
         return SizedLimits(recipe)
     if problem := _problem(size, rule, recipe.title) or _another_fruits(size, rule, press.onset_mm):
         return SizedLimits(recipe, problem=problem)
-    told = _length(size, rule)
-    if told is not None:
-        length_mm, uncertainty_mm = told
+    length = _length(size, rule)
+    if length is not None:
+        length_mm, uncertainty_mm = length
         factor = (length_mm / rule.reference_mm) ** rule.exponent
         return SizedLimits(_scaled(recipe, factor), factor, length_mm, rule.exponent * uncertainty_mm / length_mm)
     if rule.without_size == "plain_limit":
@@ -72,7 +72,7 @@ def _class(size: FruitSize, rule: SizeOfFruit) -> SizeClass | None:
 
 
 def _problem(size: FruitSize, rule: SizeOfFruit, title: str) -> Message | None:
-    """Why a size that was given cannot be the fruit's; None where it can, and where there is none."""
+    """Return the reason why a given size is impossible; None if it is possible or missing."""
     expected, length_mm, known = rule.expected_length, size.length_mm, _class(size, rule)
     if length_mm is not None and not expected.smallest_mm <= length_mm <= expected.largest_mm:
         return messages.LENGTH_UNEXPECTED(
@@ -91,7 +91,7 @@ def _problem(size: FruitSize, rule: SizeOfFruit, title: str) -> Message | None:
 
 
 def _another_fruits(size: FruitSize, rule: SizeOfFruit, width_mm: float | None) -> Message | None:
-    """Why a size does not fit the width that the gripper measured; None where it does, and where nothing is known.
+    """Return the reason why a size does not fit the measured width; None if it fits or is unknown.
 
     A line whose sizes have slipped by one fruit writes lengths that are all possible by themselves.
     """

@@ -9,7 +9,7 @@ from station.vocabulary import PackmlState, Refusal
 
 
 class State(StrEnum):
-    """Where the cycle is. `…_MEASURING` is the same as without it while the image of the step before is measured."""
+    """State of the cycle. `X_MEASURING` is `X` while the step before is being measured."""
 
     UNKNOWN = "unknown"
     CLEARING = "clearing"
@@ -57,7 +57,7 @@ class State(StrEnum):
 
 
 class StateFacts(NamedTuple):
-    """What a state means outside."""
+    """Facts of a state for the PLC and the operator."""
 
     packml: PackmlState | None
     """None while it is unknown."""

@@ -1,6 +1,6 @@
 """Messages of the running station: what its checks found, and what ended an inspection."""
 
-from station.messages.message import Nested, Number, define
+from station.messages.message import Message, Nested, Number, define
 
 INTERFACE_SILENT = define(
     "operation.interface_silent", "the PLC interface has sent nothing for {age_s} s", age_s=Number(0)
@@ -80,3 +80,8 @@ INSPECTION_TOO_LONG = define(
     "shorter settle time or fewer frames",
     needed_s=Number(0),
 )
+
+
+def internal_fault(error: Exception) -> Message:
+    """Return the message of an error that no code expected: its type and text."""
+    return INTERNAL_FAULT(words=f"{type(error).__name__}: {error}")

@@ -6,8 +6,6 @@ The jaws are fully open, so that nothing touches the gel; the reference is the m
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
 from station.messages import grip as messages
@@ -15,11 +13,10 @@ from station.messages.message import Message
 from station.press.rig import Frame, GripError, Position, Rig, Step
 from station.settings.service import ReferenceSettings
 from station.vision.contact import Image, Method
-from station.vision.image_quality import DEAD_LED, light, sharpness
+from station.vision.image_quality import DEAD_LED, light, saturated_share, sharpness
 from station.vision.median import median_image
 from station.vocabulary import Flag
 
-_SATURATED_LEVEL = 250
 _OPEN_WITHIN_MM = 2.0
 """How far short of their width jaws still count as open, mm. Estimate: a few times the 2 counts of 0.4 mm within which
 the gripper counts as at its place."""
@@ -114,7 +111,7 @@ def check_reference(image: Image, golden: PreparedReference | None, settings: Re
     Raises:
         BadReferenceError: it is not good enough.
     """
-    saturated = float(np.mean(image.max(axis=2) >= _SATURATED_LEVEL))
+    saturated = saturated_share(image)
     if saturated > settings.saturated_share:
         raise BadReferenceError(
             AlarmId.CAMERA_SATURATED,

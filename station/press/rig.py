@@ -12,9 +12,6 @@ from station.messages.message import Message
 from station.vision.contact import Contact, Image
 from station.vision.step import mean_image
 
-FINEST_STEP_MM = 0.4
-"""A step that surely moves the gripper by one count, which is 85 mm / 227 = 0.37 mm on a 2F-85."""
-
 
 class GripError(StationError):
     """The press could not be carried through; the message says at which step and why."""

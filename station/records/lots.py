@@ -2,16 +2,14 @@
 
 from sqlalchemy import Connection, insert, select, update
 
-from station.channel.panel_queries import LotView
+from station.channel.panel_lots import LotView
 from station.clock import utc_ms
 from station.messages import records as messages
 from station.records.audit import AuditEntry, append_audit
 from station.records.errors import RecordsError
 from station.records.schema import lots
 from station.records.write_requests import queue_event
-
-LONGEST_NAME = 32
-"""As the PLC gives it: `station.channel.line.Begin.lot`."""
+from station.vocabulary import LONGEST_LOT
 
 
 def start_lot(connection: Connection, name: str, grower: str, by: tuple[str, str], *, correct: bool = False) -> LotView:
@@ -27,8 +25,8 @@ def start_lot(connection: Connection, name: str, grower: str, by: tuple[str, str
     for bad, text in ((messages.BAD_LOT_NAME, name), (messages.BAD_GROWER, grower)):
         if not text.strip() or not text.isprintable():
             raise RecordsError(bad(text=repr(text)), messages.PRINTABLE_NAME())
-    if len(name) > LONGEST_NAME:
-        raise RecordsError(messages.LONG_LOT_NAME(letters=len(name)), messages.LONGEST_LOT_NAME(most=LONGEST_NAME))
+    if len(name) > LONGEST_LOT:
+        raise RecordsError(messages.LONG_LOT_NAME(letters=len(name)), messages.LONGEST_LOT_NAME(most=LONGEST_LOT))
     known = _known(connection, name)
     if known is None:
         connection.execute(insert(lots).values(name=name, grower=grower, began_utc_ms=utc_ms(), revision=1))

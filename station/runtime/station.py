@@ -33,7 +33,8 @@ from station.runtime.observability.health import HealthServer, Liveness
 from station.runtime.observability.metrics import Metrics
 from station.runtime.observability.observability import Observability
 from station.runtime.observability.startup_audit import end_entry, start_entries
-from station.runtime.production.housekeeping import UPKEEP, Housekeeping
+from station.runtime.production.housekeeping import HOUSEKEEPING, Housekeeping
+from station.runtime.production.line_state import LineState
 from station.runtime.production.lots import LotManager
 from station.runtime.production.plc_commands import PlcCommands
 from station.runtime.production.production import Production
@@ -55,7 +56,12 @@ _USUAL_DEADLINE_S = 30.0
 
 
 class Station:
-    """One start of the station, by the site's configuration, or its last good form and the error of its files."""
+    """One run of the station process.
+
+    Args:
+        configuration: the site's, or its last valid version.
+        broken: the error in its present files; empty for none.
+    """
 
     def __init__(self, configuration: Configuration, broken: str = "") -> None:
         self.boot = uuid.uuid4().hex
@@ -90,7 +96,7 @@ class Station:
         configuration, settings = self._configuration, self._configuration.service
         versions = {PROGRAM: version(PROGRAM)}
         liveness, metrics = Liveness(), Metrics(versions[PROGRAM], settings.inspection_deadline_s or _USUAL_DEADLINE_S)
-        kept, alarms = StateFiles(configuration.home), AlarmManager(metrics, to_restore=True)
+        state_files, alarms = StateFiles(configuration.home), AlarmManager(metrics, to_restore=True)
         records = Records(configuration.home / "records", configuration.records, self.boot)
         stack.push_async_callback(records.close)
         audit = AuditLogger(records)
@@ -108,7 +114,7 @@ class Station:
         devices = DeviceManager(configuration, device_changed, progress)
         _register_scrapes(metrics, configuration, records, devices.calibration)
         metrics.expect((*devices.monitors, "plc_interface", "plc"))
-        vision = VisionWorker(GoldenReference(kept, devices.calibration.golden), settings.reference)
+        vision = VisionWorker(GoldenReference(state_files, devices.calibration.golden), settings.reference)
         stack.callback(vision.close)
         observability = Observability(self.boot, versions, metrics, liveness, audit)
         inspector = Inspector(devices, vision, configuration, alarms, metrics)
@@ -116,21 +122,22 @@ class Station:
         # The first start of a release may migrate the records of years, which takes longer than any other start.
         async with extended_start():
             await service.registry.reopen(lambda: alarms.restore(records))
-        self.recipes = book = ActiveRecipes(configuration.recipes_folder, kept)
-        await asyncio.to_thread(book.read)
-        lots = LotManager(service, book, audit, kept)
+        self.recipes = recipes = ActiveRecipes(configuration.recipes_folder, state_files)
+        await asyncio.to_thread(recipes.read)
+        lots = LotManager(service, recipes, audit, state_files)
         await asyncio.to_thread(lots.restore)
-        self._note_start(audit, kept, versions)
-        orders = PlcCommands(service, devices, book, lots, kept, observability)
-        orders.restore()
-        interlock = Interlock(service, devices, orders, book, lots, observability)
-        production = Production(service, devices, book, lots, orders, interlock)
-        alarm_orders = AlarmCommands(alarms, audit)
-        panel = PanelServer(configuration, production, records, alarm_orders, audit)
+        self._note_start(audit, state_files, versions)
+        plc_commands = PlcCommands(service, devices, recipes, lots, state_files, audit)
+        line_state = LineState(alarms, metrics)
+        plc_commands.restore()
+        interlock = Interlock(service, devices, lots, plc_commands, line_state, observability)
+        production = Production(service, devices, recipes, lots, plc_commands, line_state, interlock)
+        alarm_commands = AlarmCommands(alarms, audit)
+        panel = PanelServer(configuration, production, records, alarm_commands, audit)
         health = HealthServer(
             configuration.metrics.host, configuration.metrics.port, metrics, liveness, interlock.readiness, versions
         )
-        upkeep = Housekeeping(
+        housekeeping = Housekeeping(
             configuration,
             production,
             observability,
@@ -142,19 +149,16 @@ class Station:
             verbatim(self._broken) if self._broken else None,
         )
         await panel.restore()  # before the PLC interface publishes another outcome of one of these fruit
-        line = PlcInterfaceServer(
-            _with_folder(line_endpoint(configuration.handshake, configuration.home)), production, alarm_orders
-        )
-        tasks = [self._begin(stack, line.serve(), "line server")]
+        tasks = [self._serve_plc_interface(stack, PlcInterfaceServer(production, alarm_commands))]
         pages = PanelPages(configuration, records, production, observability)
         self._serve(stack, panel, pages)
         port = await health.start()
         stack.push_async_callback(health.close)
         await self._open_devices(stack, devices, pages, alarms)
-        tasks += [self._begin(stack, service.runner.run(), CYCLE), self._begin(stack, upkeep.run(), UPKEEP)]
+        tasks += [self._begin(stack, service.runner.run(), CYCLE), self._begin(stack, housekeeping.run(), HOUSEKEEPING)]
         self._begin(stack, alarms.store_changes(records), "alarms' records")
         self._begin(stack, audit.run(), "audit trail")
-        self._watch_progress(stack, liveness, (*devices.monitors, CYCLE, UPKEEP))
+        self._watch_progress(stack, liveness, (*devices.monitors, CYCLE, HOUSEKEEPING))
         return tuple(tasks), port
 
     @staticmethod
@@ -167,6 +171,10 @@ class Station:
         await stack.enter_async_context(pages)
         await devices.open()
 
+    def _serve_plc_interface(self, stack: contextlib.AsyncExitStack, server: PlcInterfaceServer) -> asyncio.Task[None]:
+        endpoint = _with_folder(line_endpoint(self._configuration.handshake, self._configuration.home))
+        return self._begin(stack, ChannelServer(endpoint, server.handlers).serve(), "line server")
+
     def _serve(self, stack: contextlib.AsyncExitStack, panel: PanelServer, pages: PanelPages) -> None:
         stack.push_async_callback(panel.close)
         endpoint = _with_folder(panel_endpoint(self._configuration.hmi, self._configuration.home))
@@ -175,10 +183,10 @@ class Station:
     def _watch_progress(self, stack: contextlib.AsyncExitStack, liveness: Liveness, names: tuple[str, ...]) -> None:
         for name in names:
             liveness.watch(name, self._configuration.service.progress_s)
-        self._begin(stack, feed_watchdog(lambda: liveness.stuck().keys().isdisjoint({CYCLE, UPKEEP})), "watchdog")
+        self._begin(stack, feed_watchdog(lambda: liveness.stuck().keys().isdisjoint({CYCLE, HOUSEKEEPING})), "watchdog")
 
-    def _note_start(self, audit: AuditLogger, kept: StateFiles, versions: Mapping[str, str]) -> None:
-        entries, confirm = start_entries(self.boot, self._configuration, kept, versions, self._broken)
+    def _note_start(self, audit: AuditLogger, state_files: StateFiles, versions: Mapping[str, str]) -> None:
+        entries, confirm = start_entries(self.boot, self._configuration, state_files, versions, self._broken)
         audit.log(*entries, on_stored=partial(asyncio.to_thread, confirm))
 
     async def _note_end(self, audit: AuditLogger) -> None:

@@ -24,11 +24,10 @@ NEXT_REQUEST_S = KEEP_ALIVE_S + 5.0
 STALLED_S = 10.0
 """A client that does not take its response for so long is disconnected."""
 WAITING = 128
-"""Connections that the kernel keeps for us to accept."""
+"""Length of the kernel's queue of connections that are not accepted yet."""
 ADMITTED_AT_ONCE = 1
-"""Connections accepted before those that exist have their turn. A client takes some milliseconds to speak, and its
-request some five turns until it is known here: were as many accepted meanwhile as an address has places, they would
-displace the connection that it came by."""
+"""Connections accepted in one turn of the event loop. A request is known here some five turns after its connection;
+with more at once, a client's new connections could displace the one whose request is on its way."""
 _TCP_INFO_BYTES_RECEIVED = slice(128, 136)
 """In tcp_info of linux/tcp.h."""
 
@@ -73,14 +72,14 @@ class GuardedConnection(socket.socket):
         self.holder, self.known = client[0], False
         self.since_s = time.monotonic()
         """When it began, or its last response ended."""
-        self.has_asked = self.is_asking = self._is_closed = False
+        self.has_requested = self.in_request = self._is_closed = False
 
     @property
     def rank(self) -> tuple[float, ...] | None:
         """A silent one gives way first, then one without a whole request; one with a request under way does not."""
-        if self.is_asking:
+        if self.in_request:
             return None
-        return (2 if self.has_asked else 1 if self._has_spoken else 0, self.since_s)
+        return (2 if self.has_requested else 1 if self._has_spoken else 0, self.since_s)
 
     @property
     def _has_spoken(self) -> bool:
@@ -94,8 +93,8 @@ class GuardedConnection(socket.socket):
     @property
     def overdue(self) -> bool:
         """Whether the next request should be there by now."""
-        limit_s = NEXT_REQUEST_S if self.has_asked else FIRST_REQUEST_S
-        return not self.is_asking and time.monotonic() - self.since_s > limit_s
+        limit_s = NEXT_REQUEST_S if self.has_requested else FIRST_REQUEST_S
+        return not self.in_request and time.monotonic() - self.since_s > limit_s
 
     def displace(self) -> None:
         """End the connection: the event loop that reads it finds its end, and closes it."""
@@ -105,22 +104,22 @@ class GuardedConnection(socket.socket):
     def close(self) -> None:
         """Close it, and free its place."""
         super().close()
-        if not self._is_closed and not self.has_asked:
-            self._listener.ended_unasked = True
+        if not self._is_closed and not self.has_requested:
+            self._listener.ended_without_request = True
         self._is_closed = True
         self._leave()
 
     def begin(self) -> None:
         """Note that a whole request has come."""
-        self.has_asked = self.is_asking = True
+        self.has_requested = self.in_request = True
 
     def end(self) -> None:
         """Note that a request is answered."""
-        self.is_asking, self.since_s = False, time.monotonic()
+        self.in_request, self.since_s = False, time.monotonic()
         self._leave()
 
     def _leave(self) -> None:
-        if self._is_closed and not self.is_asking:
+        if self._is_closed and not self.in_request:
             self._listener.places.leave(self)
 
 
@@ -136,7 +135,7 @@ class GuardedListener(socket.socket):
         self._known = known
         self.places: Places[GuardedConnection] = Places(limits.most, limits.per_address, limits.reserve)
         self._flood = ""
-        self.ended_unasked = False
+        self.ended_without_request = False
         """Whether a connection was closed without a request, since this was last set back."""
 
     @property

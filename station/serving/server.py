@@ -17,7 +17,7 @@ from station.serving.guard import ADMITTED_AT_ONCE, KEEP_ALIVE_S, GuardedListene
 CLOSE_S = 1.0
 """Maximum wait for pending answers when closing."""
 FREED_EACH_TICKS = 10
-"""Ten a second."""
+"""Uvicorn ticks ten times a second."""
 
 
 class AddressError(StationError):
@@ -60,9 +60,9 @@ class Server(uvicorn.Server):
         objects would wait for the collector until there are thousands of them, each connection with 0.4 MB of buffers.
         """
         self._listener.sweep()
-        if self.config.is_ssl and self._listener.ended_unasked and counter % FREED_EACH_TICKS == 0:
-            self._listener.ended_unasked = False
-            gc.collect()  # of milliseconds, as what the start has made is frozen
+        if self.config.is_ssl and self._listener.ended_without_request and counter % FREED_EACH_TICKS == 0:
+            self._listener.ended_without_request = False
+            gc.collect()  # takes milliseconds: the objects of the start are frozen (`station.cli`)
             return_freed_memory()
         return await super().on_tick(counter)
 

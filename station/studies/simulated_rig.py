@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from station.calibration.rig import Place
+from station.inspection.press import FINEST_STEP_MM
 from station.messages.message import Message
-from station.press.rig import FINEST_STEP_MM, Position
+from station.press.rig import Position
 from station.settings.gripper import GripperCalibration
 from station.twin.contact import FruitOnGel, Pose
 from station.twin.digit.sensor import Condition, DigitSensor, Image

@@ -53,7 +53,8 @@ class Program:
     output: Path | None = None
     """File for its output and messages; None for the supervisor's own output."""
     outlives: str | None = None
-    """Name of a program before it that ends before it all the same; None for one that ends before all before it."""
+    """Name of an earlier program that is stopped before this one; None where this one is stopped before all earlier
+    ones."""
 
 
 class _Child:
@@ -145,7 +146,7 @@ class _Child:
         if self.program.output is None:
             return "see its messages above"
         lines = self.program.output.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-        return f"{lines[-1] if lines else 'without a word'} (see {self.program.output})"
+        return f"{lines[-1] if lines else 'no output'} (see {self.program.output})"
 
     def close(self) -> None:
         self._listening.close()

@@ -25,7 +25,7 @@ from station.channel.line import (
     Outcome,
     StationState,
 )
-from station.channel.panel_live import GetPanelState, PanelState
+from station.channel.panel_run import GetPanelState, PanelState
 from station.messages import calibration as messages
 from station.messages import grip, readiness
 from station.messages.message import verbatim

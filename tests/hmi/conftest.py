@@ -41,7 +41,7 @@ from station.channel.line import (
     Published,
 )
 from station.channel.messages import ChannelError
-from station.channel.panel_live import GetPanelState, PanelState
+from station.channel.panel_run import GetPanelState, PanelState
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint

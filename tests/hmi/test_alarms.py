@@ -9,7 +9,7 @@ from hmi.web.gateway import STALE_S
 from hmi.web.roles import Role
 from station.channel.line import CommandDone
 from station.channel.panel import ListedAlarm
-from station.channel.panel_live import PanelState
+from station.channel.panel_run import PanelState
 from station.inspection.alarm_table import ALARMS, AlarmId
 from tests.chromium import follow
 from tests.hmi.test_security import log_in

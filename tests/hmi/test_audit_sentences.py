@@ -13,7 +13,7 @@ from hmi.web.folders import HMI
 from hmi.web.text import texts
 from hmi.web.translation import Locale
 from station.channel.line import CommandName
-from station.channel.panel_live import OperatorCommandName, PersonNoted
+from station.channel.panel_run import OperatorCommandName, PersonNoted
 from station.recipe_store.revision import Origin
 from station.records.audit import AuditRow
 from station.runtime.observability.audit_logger import AlarmChange

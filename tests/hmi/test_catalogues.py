@@ -133,7 +133,7 @@ def test_a_number_chooses_the_form(number, said):
 
 
 def test_a_message_is_written_in_every_language():
-    said = channel.NO_ANSWER(peer="arm", limit_s=2.5, purpose="pose")
+    said = channel.NO_ANSWER(peer="arm", request="Pose", limit_s=2.5)
     written = {language: Locale(language).sentence(said) for language in LANGUAGES}
     assert written["en"] == str(said)
     assert len(set(written.values())) == len(LANGUAGES)

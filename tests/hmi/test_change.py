@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from station.channel.panel_live import (
+from station.channel.panel_run import (
     OperatorCommandName,
     OperatorCommandView,
     PanelState,

@@ -9,7 +9,7 @@ import pytest
 
 from hmi.configuration.file import digest
 from hmi.web.roles import Role
-from station.channel.panel_live import PersonNoted
+from station.channel.panel_run import PersonNoted
 from tests.hmi.test_security import log_in
 
 PATH = "/maintenance/configuration"

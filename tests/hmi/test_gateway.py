@@ -7,7 +7,7 @@ from hmi.web.gateway import Gateway
 from hmi.web.roles import Role
 from hmi.web.translation import Locale
 from station.channel.line import Outcome
-from station.channel.panel_live import (
+from station.channel.panel_run import (
     Fruit,
     FruitSummary,
     GetFruit,
@@ -17,7 +17,7 @@ from station.channel.panel_live import (
     PanelState,
     Recent,
 )
-from station.runtime.rpc.recent_inspections import RecentInspections, RestoredFruit
+from station.runtime.rpc.recent_inspections import RecentFruit, RecentInspections
 from station.vocabulary import Reason
 
 PASSED = FruitSummary(
@@ -64,7 +64,7 @@ def test_the_button_that_aborts_a_fruit_is_the_running_ones(pages):
 def test_an_outcome_that_the_plc_was_given_in_place_of_the_stations_is_shown():
     async def scenario():
         inspections, full = RecentInspections(lambda *_: {}), dict[str, Any](short=PASSED)
-        inspections.restore([PASSED], [RestoredFruit(Fruit.model_construct(**full), None)], {"A": {"PASS": 1}})
+        inspections.restore([PASSED], [RecentFruit(Fruit.model_construct(**full), None)], {"A": {"PASS": 1}})
         async with Station(inspections) as gateway:
             await gateway.polled()
             await gateway.polled()

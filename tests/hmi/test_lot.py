@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from hmi.web.roles import Role
-from station.channel.panel_live import OperatorCommandView, PanelState
+from station.channel.panel_run import OperatorCommandView, PanelState
 from station.messages import lots
 from station.messages.operation import INTERNAL_FAULT
 from station.runtime.production.lots import LotManager

@@ -1,6 +1,6 @@
 """What the PLC does wrong, beside its registers."""
 
-from station.channel.panel_maintenance_queries import Registers
+from station.channel.panel_maintenance import Registers
 from station.messages.line import TRIGGER_NOT_RESET, WRONG_ACKNOWLEDGEMENT
 
 

@@ -7,9 +7,8 @@ import pytest
 
 from hmi.run import charts
 from hmi.web.translation import Locale
-from station.channel.panel_live import LONGEST_LOT
 from station.messages import states
-from station.vocabulary import Reason
+from station.vocabulary import LONGEST_LOT, Reason
 from tests.chromium import follow
 
 MM_A_PX = 25.4 * 10.1 / (1280**2 + 800**2) ** 0.5

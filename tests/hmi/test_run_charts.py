@@ -8,7 +8,7 @@ import pytest
 from hmi.run import charts
 from hmi.run.routes import MOST_RECENT, fruit_values
 from hmi.web.translation import Locale
-from station.channel.panel_live import CurvePointSummary, Fruit, FruitSummary, LimitView
+from station.channel.panel_run import CurvePointSummary, Fruit, FruitSummary, LimitView
 from station.vocabulary import OutcomeName
 
 

@@ -10,8 +10,8 @@ import pytest
 from hmi.maintenance import routes as maintenance
 from hmi.web.roles import Role
 from hmi.web.translation import Locale
-from station.channel.panel_live import Counts, OperatorCommand, OperatorCommandName, OperatorCommandView, PanelState
-from station.channel.panel_maintenance_queries import Health
+from station.channel.panel_maintenance import Health
+from station.channel.panel_run import Counts, OperatorCommand, OperatorCommandName, OperatorCommandView, PanelState
 from station.messages import commands
 from station.messages.message import verbatim
 

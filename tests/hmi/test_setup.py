@@ -9,7 +9,7 @@ import pytest
 from hmi.setup.steps import steps
 from hmi.web.roles import Role
 from hmi.web.translation import Locale
-from station.channel.panel_live import DeviceView, FruitSummary, PanelState, Recent, RecipeNames, SetupView
+from station.channel.panel_run import DeviceView, FruitSummary, PanelState, Recent, RecipeNames, SetupView
 from station.messages import calibration, readiness
 from station.messages.message import Message, verbatim
 from tests.hmi.test_security import log_in

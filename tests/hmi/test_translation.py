@@ -14,7 +14,7 @@ from hmi.web.folders import HMI
 from hmi.web.navigation import entries, modules, parts
 from hmi.web.text import texts
 from hmi.web.translation import NO_VALUE, Locale, page_translations, preferred, translations
-from station.channel.panel_live import OperatorCommandName
+from station.channel.panel_run import OperatorCommandName
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import CameraError, FrameFault
 from station.devices.gripper.errors import GripperError, GripperFaultError

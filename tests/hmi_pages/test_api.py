@@ -11,9 +11,9 @@ import schemathesis
 from hypothesis import HealthCheck, assume, given, settings
 
 from hmi.web.roles import Role
-from station.channel.panel_live import LONGEST_LOT
 from station.records.audit_report import read_audit
 from station.records.database import reading as open_records
+from station.vocabulary import LONGEST_LOT
 
 pytestmark = pytest.mark.timeout(400)
 

@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page, Route, expect
 from hmi.web.app import make_app, make_context
 from hmi.web.roles import Role
 from hmi.web.translation import Locale
-from station.channel.panel_live import PanelState
+from station.channel.panel_run import PanelState
 from station.settings.configuration import load_configuration
 from station.settings.hmi import LANGUAGES, Language
 from tests.hmi.conftest import Pages

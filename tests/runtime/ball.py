@@ -4,19 +4,19 @@ from typing import Any
 
 from station.channel.client import ChannelClient
 from station.channel.panel import Actor
-from station.channel.panel_live import (
-    GetPanelState,
-    OperatorCommand,
-    OperatorCommandName,
-    OperatorCommandView,
-    PanelState,
-)
-from station.channel.panel_maintenance_queries import (
+from station.channel.panel_maintenance import (
     CalibrationRunView,
     CalibrationState,
     EndCalibrationRun,
     GetCalibration,
     StartCalibrationRun,
+)
+from station.channel.panel_run import (
+    GetPanelState,
+    OperatorCommand,
+    OperatorCommandName,
+    OperatorCommandView,
+    PanelState,
 )
 from tests.eventually import until
 

@@ -6,10 +6,11 @@ from pathlib import Path
 from station.runtime.alarms.manager import AlarmManager
 from station.runtime.cycle.registry import InspectionRegistry
 from station.runtime.cycle.service import Service
+from station.runtime.production.line_state import LineState
 from station.runtime.production.plc_commands import PlcCommands
 
 ROOT = Path(__file__).resolve().parents[2]
-OWNERS = (AlarmManager, InspectionRegistry, PlcCommands, Service)
+OWNERS = (AlarmManager, InspectionRegistry, LineState, PlcCommands, Service)
 
 
 def written(tree):

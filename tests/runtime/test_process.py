@@ -15,7 +15,7 @@ from plc_interface.registers.map import BY_NAME
 from station.channel.client import ChannelClient
 from station.channel.line import CommandName, PackmlState
 from station.channel.panel import Actor
-from station.channel.panel_live import (
+from station.channel.panel_run import (
     GetPanelState,
     OperatorCommand,
     OperatorCommandName,

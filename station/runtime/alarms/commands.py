@@ -38,10 +38,10 @@ class AlarmCommands:
 
     async def list_alarms(self, _request: ListAlarms) -> AlarmList:
         """List the alarms that are not in their normal state."""
-        return AlarmList(alarms=self.active())
+        return AlarmList(alarms=self.listed())
 
-    def active(self) -> tuple[ListedAlarm, ...]:
-        """List the same alarms, most urgent first."""
+    def listed(self) -> tuple[ListedAlarm, ...]:
+        """Return the alarms that are not in their normal state, most urgent first."""
         return tuple(_listed(alarm) for alarm in self._alarms.alarms.not_normal)
 
     async def acknowledge(self, request: AcknowledgeAlarm) -> CommandDone:

@@ -157,16 +157,16 @@ class AlarmManager:
 
     def set_device_fault(self, device: str, fault: StationError | None) -> None:
         """Raise the alarm of the fault of the `arm`, `gripper` or `camera`, or clear the alarms of a healthy one."""
-        told = None if fault is None else alarm_of(device, fault)
-        before, self._device_alarms[device] = self._device_alarms.get(device), told
-        kept = {alarm for name in self._watched if name not in self._device_alarms for alarm in OF_DEVICE[name]}
+        alarm = None if fault is None else alarm_of(device, fault)
+        before, self._device_alarms[device] = self._device_alarms.get(device), alarm
+        kept = {other for name in self._watched if name not in self._device_alarms for other in OF_DEVICE[name]}
         if self._stopped_on_pendant():
             kept.add(AlarmId.ARM_NOT_REMOTE)
-        for alarm in OF_DEVICE[device] | ({before} if before is not None else set()):
-            if alarm not in self._device_alarms.values() and alarm not in kept:
-                self.clear(alarm)
-        if told is not None and fault is not None:
-            self.update(told, message_of(fault))
+        for other in OF_DEVICE[device] | ({before} if before is not None else set()):
+            if other not in self._device_alarms.values() and other not in kept:
+                self.clear(other)
+        if alarm is not None and fault is not None:
+            self.update(alarm, message_of(fault))
 
     def acknowledge(self, alarm: AlarmId) -> bool:
         """Acknowledge an alarm, and return whether that changed anything."""
@@ -211,19 +211,17 @@ class AlarmManager:
 
         Their causes count as present until a check clears them.
         """
-        stored = Alarms.from_data(
-            [
-                {
-                    "id": row.id,
-                    "state": row.state,
-                    "detail": message_in(row.detail),
-                    "since_s": row.raised_utc_ms / 1000,
-                    "raised": 1,
-                    "shelved_until_s": None if row.shelved_until_utc_ms is None else row.shelved_until_utc_ms / 1000,
-                    "shelved_by": row.shelved_by,
-                }
-                for row in await records.load_alarms()
-            ]
+        stored = Alarms.restored(
+            {
+                "id": row.id,
+                "state": row.state,
+                "detail": message_in(row.detail),
+                "since_s": row.raised_utc_ms / 1000,
+                "raised": 1,
+                "shelved_until_s": None if row.shelved_until_utc_ms is None else row.shelved_until_utc_ms / 1000,
+                "shelved_by": row.shelved_by,
+            }
+            for row in await records.load_alarms()
         )
         former = {alarm.id: alarm for alarm in stored.known.values() if alarm.id not in self.alarms.known}
         self.alarms = Alarms({**former, **self.alarms.known})

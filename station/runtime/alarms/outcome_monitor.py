@@ -9,7 +9,9 @@ from station.runtime.alarms.manager import AlarmManager
 from station.vocabulary import OutcomeName
 
 _LAST = 20
+"""Outcomes that the reject rate is taken over: an estimate."""
 _MANY = 5
+"""NO_RESULT in a row that raise the alarm: an estimate."""
 
 
 class OutcomeMonitor:

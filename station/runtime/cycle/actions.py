@@ -1,4 +1,4 @@
-"""Carries one inspection's actions out on the devices; what came of each is an event of the cycle."""
+"""Inspector: carries out an inspection's actions on the devices; each ends with an event."""
 
 import asyncio
 import itertools
@@ -36,7 +36,8 @@ from station.vocabulary import Reason
 log = logging.getLogger(__name__)
 
 _LET_GO_S, _LET_GO_AGAIN_S = 3.0, 0.2
-"""So long, with such pauses, and once in any case the jaws are opened again: cuts in `./run bench wire` are shorter."""
+"""The jaws are opened again with these pauses, for so long and at least once more; the cuts of `./run bench wire` are
+shorter."""
 _WIRE_FAULTS = (*LINK_ERRORS, GripperTimeoutError)
 
 
@@ -104,14 +105,9 @@ class Inspector:
 
     async def approach(self, now: Inspection) -> Event:
         """Bring the jaws to the fruit, a little wider than it may be, while the reference is taken and examined."""
-        good: list[bool] = []
-
-        async def examined() -> None:
-            good.append(await self._examined(now))
-
         jaws = self._devices.cell.gripper.open(self._width_around(now))
-        await at_once(self._rig(now).go("above_nest", "nest"), jaws, examined())
-        return Event.ARRIVED if all(good) else Event.REFERENCE_BAD
+        *_, good = await at_once(self._rig(now).go("above_nest", "nest"), jaws, self._examined(now))
+        return Event.ARRIVED if good else Event.REFERENCE_BAD
 
     def _width_around(self, now: Inspection) -> float:
         """The jaws' width beside any fruit that the recipe expects, and beside the one that was met."""
@@ -122,14 +118,14 @@ class Inspector:
         return min(widest_mm + self._arm.jaw_clearance_mm, self._devices.cell.gripper.max_width_mm)
 
     async def _examined(self, now: Inspection) -> bool:
-        """Take the reference's frames, while nothing touches the gel, and examine them."""
+        """Take the reference's frames, while nothing touches the gel, and examine them.
+
+        Returns:
+            Whether they may serve as the reference; if not, the inspection and an alarm have the reason.
+        """
         frames = await self._rig(now, self._count).frames(now.active.recipe.imaging.reference_frames)
         self._devices.monitors[CAMERA].report_success()
         now.reference_s = frames[-1].captured_s
-        return await self._examine(now, frames)
-
-    async def _examine(self, now: Inspection, frames: tuple[Frame, ...]) -> bool:
-        """Whether the frames may serve as the reference; where not, the inspection and an alarm have the reason."""
         try:
             segmentation = gated(now.active.recipe.segmentation, self._devices.calibration.gate_factor)
             image, looks = await self._vision.take_reference(frames, segmentation)
@@ -219,16 +215,16 @@ class Inspector:
         now.measures.setdefault("off_right_mm", round(off.right_mm, 2))
         now.measures.setdefault("off_down_mm", round(off.down_mm, 2))
         if off.length_mm < from_mm:
-            told = "near enough"
+            why_not = "near enough"
         elif self._devices.cell.arm is None:
-            told = "no arm"
+            why_not = "no arm"
         elif too_far(off, now.moved, self._arm.centring.most_mm):
-            told = "too far"
+            why_not = "too far"
         else:
             now.target = now.moved.then(off)
             now.measures["centring"] = "moved"
             return True
-        now.measures.setdefault("centring", told)
+        now.measures.setdefault("centring", why_not)
         return False
 
     async def centre(self, now: Inspection) -> Event:

@@ -10,6 +10,7 @@ from station.state_files import StateFiles
 FILE_NAME = "held_for_a_person"
 _NONE = b"no"
 _DEADLINE_S = 1.0
+"""Longest wait for the disk, s: an estimate. A slower write goes on in the background."""
 _HOLDS = {event.encode(): event for event in (Event.FRUIT_HELD, *LATCHES)}
 
 log = logging.getLogger(__name__)
@@ -37,7 +38,9 @@ class Hold:
         storing = asyncio.create_task(self._store(), name="hold's file")
         await asyncio.wait({storing}, timeout=_DEADLINE_S)
         if not storing.done():
-            log.warning("the disk is slow: after a kill now nothing would be known of: %s", self.event)
+            log.warning(
+                "the disk is slow: if the process is killed now, the next start does not know of %s", self.event
+            )
             self._late.add(storing)
             storing.add_done_callback(self._late.discard)
 

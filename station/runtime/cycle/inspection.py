@@ -1,4 +1,4 @@
-"""One inspection's own state: what was triggered, seen and found, until it is a record."""
+"""Inspection: data of one inspection from its trigger to its record."""
 
 import time
 from dataclasses import dataclass, field
@@ -114,7 +114,7 @@ class Inspection:
         return next((seen.step.move.width_mm for seen in self.seen if seen.contact.is_firm), None)
 
     def interrupt(self, reason: Reason, why: Message | None) -> None:
-        """Something from outside the measurement ended or spoilt it: the reason for the PLC, and why for a person."""
+        """Note an interruption: its reason for the PLC, and its message for a person."""
         if reason not in self.interruptions:
             self.interruptions.append(reason)
         if why is not None and why not in self.explanation:
@@ -145,7 +145,7 @@ class Inspection:
         self.reference_image = None
 
     def press(self) -> Press:
-        """What was measured so far, of all presses together, for the judge."""
+        """Return all presses so far as one."""
         return together([*self.earlier, self._latest()])
 
     def _latest(self) -> Press:
@@ -171,7 +171,7 @@ class Inspection:
         )
 
     def record(self) -> InspectionRecord:
-        """What is to be made durable."""
+        """Return the record to store."""
         verdict, onset_mm = self.verdict, self.onset_mm
         deciding = verdict.deciding if verdict is not None else None
         found = [finding.reason for finding in verdict.findings] if verdict is not None else []

@@ -18,7 +18,9 @@ from station.settings.recipe import Recipe
 RECORD_NO_RESULT_S = 1.0
 """For a NO_RESULT to become durable, past the inspection's own deadline."""
 _MEASURE_S = 0.1
+"""Measurement of one image on an idle machine, s: an estimate."""
 _FRAMES_PER_S = 30.0
+"""Frame rate of a camera that does not report its own: an estimate."""
 
 
 class Pacing:
@@ -31,7 +33,7 @@ class Pacing:
         """The deadlines of a recipe's inspection on a machine that has nothing else to do.
 
         Raises:
-            BadInputError: an inspection would take longer than the PLC can be told.
+            BadInputError: an inspection would take longer than the longest deadline that the PLC interface accepts.
         """
         cell, configuration = self._cell, self._configuration
         pace = Pace(
@@ -50,7 +52,7 @@ class Pacing:
 
         Raises:
             BadInputError: no fruit passes by its method, the deadline leaves no time for its longest way, or an
-                inspection would take longer than the PLC can be told.
+                inspection would take longer than the longest deadline that the PLC interface accepts.
         """
         if recipe.segmentation.method == "paper":  # of a file that was adopted: nobody may submit it
             raise BadInputError(NOT_FOR_INSPECTIONS(recipe=recipe.name))
@@ -70,7 +72,7 @@ class Pacing:
 
 
 def late_now(now: Inspection, state: State, in_state_s: float) -> Late | None:
-    """What of an accepted inspection is late."""
+    """Return the passed deadline of an accepted inspection, if any."""
     if now.accepted_s is None:
         return None
     since_s = None if now.standing is not None else time.monotonic() - now.accepted_s

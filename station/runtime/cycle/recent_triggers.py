@@ -9,6 +9,7 @@ from station.records.errors import UnknownInspectionError
 from station.runtime.cycle.inspection import Inspection
 
 _REMEMBERED = 64
+"""Inspections in memory: an estimate of how many the PLC interface may still come for."""
 
 
 class RecentTriggers:

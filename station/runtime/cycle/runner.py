@@ -1,4 +1,4 @@
-"""Drives the cycle's table: one event after the other, and for each the actions that the table names."""
+"""State machine runner: takes one event after the other and starts the table's actions."""
 
 import asyncio
 import logging
@@ -18,7 +18,9 @@ from station.records.errors import RecordsError
 from station.runtime.devices.rig import FramesError
 
 TICK_S = 0.1
+"""Longest wait for an event until the next tick, s: an estimate."""
 HALT_DEADLINE_S = 5.0
+"""Longest wait for the devices to stop, s: an estimate."""
 
 log = logging.getLogger(__name__)
 
@@ -63,7 +65,7 @@ class Happened(NamedTuple):
 
 
 class Performer(Protocol):
-    """Who carries the actions out."""
+    """Performer of the cycle's actions."""
 
     def perform(self, action: Action, because: Happened) -> Work | None:
         """Carry an action out, never HALT; if it takes time, give what runs beside all else and ends with its event."""
@@ -74,7 +76,7 @@ class Performer(Protocol):
     def storing(self, event: Event, state: State) -> Awaitable[None] | None:
         """Give what has to be durable before the state that the event leads to is shown; None where nothing changes."""
 
-    def raise_alarm(self, told: Raise, why: Message | None) -> None:
+    def raise_alarm(self, alarm: Raise, why: Message | None) -> None:
         """Raise an alarm, with what was seen."""
 
     def entered(self, state: State, after: State, took_s: float) -> None:
@@ -211,7 +213,7 @@ class CycleRunner:
             work = self._performer.perform(action, because)
         except Exception as error:  # a bug in one action must end in an outcome, not in silence
             log.exception("action %s", action)
-            self.post(Event.INTERNAL_FAULT, messages.INTERNAL_FAULT(words=f"{type(error).__name__}: {error}"))
+            self.post(Event.INTERNAL_FAULT, messages.internal_fault(error))
             return
         if work is not None:
             task = asyncio.create_task(self._end_with_event(action, work), name=f"action {action}")
@@ -228,7 +230,7 @@ class CycleRunner:
                 log.exception("action %s", action)
         except Exception as error:  # as above
             log.exception("action %s", action)
-            event, why = Event.INTERNAL_FAULT, messages.INTERNAL_FAULT(words=f"{type(error).__name__}: {error}")
+            event, why = Event.INTERNAL_FAULT, messages.internal_fault(error)
         if event is not None:
             self._events.put_nowait(Happened(event, why, me))
         elif me is not None:
@@ -240,7 +242,7 @@ class CycleRunner:
             async with asyncio.timeout(HALT_DEADLINE_S):
                 await self._performer.halt()
         except TimeoutError:
-            log.warning("the devices did not confirm within %g s that they stand", HALT_DEADLINE_S)
+            log.warning("the devices did not confirm within %g s that they have stopped", HALT_DEADLINE_S)
 
     async def _forget(self, keep: Container[Action] = ()) -> None:
         left = {task for task, action in self._doing.items() if action not in keep}

@@ -34,7 +34,6 @@ from station.state_files import StateFiles
 from station.vocabulary import Refusal
 
 CYCLE = "cycle"
-_LEASE_S = 2.0
 
 
 class Service:
@@ -246,21 +245,19 @@ class Service:
             return None
         if action in self._of_station:
             return self._of_station[action]
-        if self._now is None:
-            raise RuntimeError(f"{action} without an inspection")
-        return partial(self._of_inspection[action], self._now)
+        return partial(self._of_inspection[action], self._inspection)
 
     async def halt(self) -> None:
         """Stop the devices where they are."""
         await self._devices.halt()
 
     def storing(self, event: Event, state: State) -> Awaitable[None] | None:
-        """Give the write of a hold that a state begins or ends."""
+        """Return the write of the hold that a state begins or ends; None without one."""
         return self._hold.store() if self._hold.changes(event, state) else None
 
-    def raise_alarm(self, told: Raise, why: Message | None) -> None:
+    def raise_alarm(self, alarm: Raise, why: Message | None) -> None:
         """Raise an alarm of the cycle."""
-        self.alarms.raise_(told.alarm, why)
+        self.alarms.raise_(alarm.alarm, why)
 
     def failed(self, fault: StationError) -> None:
         """Report a fault to the device's monitor before the cycle reads the devices' state."""
@@ -280,7 +277,7 @@ class Service:
         inspecting_now = STATES[state].refusal is Refusal.BUSY and state not in ACCEPTING
         if self.manual_activity is None:  # else they are that activity's
             self._devices.use(by_inspection=inspecting_now)
-        if state in {State.LATCHED, State.CARRIED}:
+        if STATES[state].needs_person:
             self._automatic_reset = self._reset_given = False
         if state is State.IDLE:
             self.alarms.clear(AlarmId.FRUIT_HELD)
@@ -295,7 +292,7 @@ class Service:
         """Feed the watchdogs, and give the cycle the events of elapsed time."""
         self._liveness.progress(CYCLE)
         if not self._liveness.stuck():
-            self._devices.renew_health(_LEASE_S)
+            self._devices.renew_health()
         self._report_late()
         # A HALT would stop what an activity at the panel still moves: its jaws that open, and the arm that leaves.
         moves_by_hand = self.manual_activity is not None
@@ -347,14 +344,10 @@ class Service:
         self._take_on(pending)
 
     def _close_as_no_result(self, because: Happened) -> None:
-        if self._now is None:
-            raise RuntimeError("an outcome without an inspection")
-        self._inspector.close_as_no_result(self._now, because.event, because.why)
+        self._inspector.close_as_no_result(self._inspection, because.event, because.why)
 
     def _publish(self) -> None:
-        if self._now is None:
-            raise RuntimeError("an outcome without an inspection")
-        self.registry.deliver(self._now)
+        self.registry.deliver(self._inspection)
 
     def _refuse(self, because: Happened) -> None:
         """End a trigger without an inspection: refused if it is not durable yet, else accepted and closed."""
@@ -387,6 +380,13 @@ class Service:
         pending.answer(reply)
 
     # Small parts.
+
+    @property
+    def _inspection(self) -> Inspection:
+        """The inspection under way, or the last one."""
+        if self._now is None:
+            raise RuntimeError("there is no inspection")
+        return self._now
 
     def _refused(self, refusal: Refusal) -> BeginReply:
         self._metrics.refused(refusal)

@@ -9,7 +9,7 @@ from station.runtime.devices.rig import FRAME_DEADLINE_S, Cell, DeviceRig
 from station.settings.arm import PoseName
 from station.settings.recipe import Recipe
 
-Refusal = Callable[[], Message | None]
+WhyRefused = Callable[[], Message | None]
 """Returns why something may not be moved now; None where it may."""
 
 
@@ -29,8 +29,8 @@ class CalibrationRig(DeviceRig):
         recipe: Recipe,
         lay: Callable[[Place], Awaitable[None]],
         patience: float = 1.0,
-        refusal: Refusal = lambda: None,
-        opening_refusal: Refusal = lambda: None,
+        refusal: WhyRefused = lambda: None,
+        opening_refusal: WhyRefused = lambda: None,
     ) -> None:
         super().__init__(cell, recipe, FRAME_DEADLINE_S * patience)
         self._lay, self._refusal, self._opening_refusal = lay, refusal, opening_refusal
@@ -66,6 +66,6 @@ class CalibrationRig(DeviceRig):
         await self._lay(place)
 
 
-def _require_none(refusal: Refusal) -> None:
+def _require_none(refusal: WhyRefused) -> None:
     if why := refusal():
         raise GripError(why)

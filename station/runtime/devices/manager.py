@@ -28,7 +28,7 @@ from station.messages import gripper as gripper_messages
 from station.press.reference import are_open
 from station.runtime.devices.calibration import ActiveCalibration
 from station.runtime.devices.monitor import DeviceMonitor
-from station.runtime.devices.rig import FRAME_DEADLINE_S, Cell, FramesError
+from station.runtime.devices.rig import FRAME_DEADLINE_S, HEALTH_LEASE_S, Cell, FramesError
 from station.settings.configuration import Configuration
 
 log = logging.getLogger(__name__)
@@ -38,13 +38,17 @@ TITLES = {CAMERA: device_messages.CAMERA(), GRIPPER: device_messages.GRIPPER(), 
 SAFETY_STOPS = {ArmCause.PROTECTIVE_STOP, ArmCause.EMERGENCY_STOP, ArmCause.SAFETY_FAULT}
 """Stops by the arm's safety controller that a person has to check at the cell."""
 _BAD_FRAMES = 3
+"""Checks with a bad frame in a row that make a fault: an estimate."""
 _OPENING_SHARE = 0.5
+"""Share of `service.progress_s` that the opening of a camera may take at most: an estimate."""
 _STALE_CHECKS = 3
 """Failed checks in a row that make a fault: one may be a moment's delay of this machine."""
 _ARM_PAUSE_S = 0.5
 """The driver reconnects to the arm by itself; only its state is read."""
 _OVER_TEMPERATURE = 0x8
+"""Fault code gFLT (Robotiq manual)."""
 _OLD_WIDTH_S = 1.0
+"""Age from which a width that was read is not shown any more, s: an estimate."""
 _STOP_SHOWN_S, _STOP_POLL_S = 0.3, 0.1
 """So long after the gripper has lost its power the arm's state may show the emergency stop that took it."""
 
@@ -108,7 +112,7 @@ class DeviceManager:
         if self._arm is not None:
             await self._arm.open()
         self._tasks = [
-            asyncio.create_task(watch.run(), name=f"watch of the {name}") for name, watch in self.monitors.items()
+            asyncio.create_task(monitor.run(), name=f"monitor of the {name}") for name, monitor in self.monitors.items()
         ]
 
     async def close(self) -> None:
@@ -132,12 +136,12 @@ class DeviceManager:
     @property
     def faults(self) -> dict[str, StationError]:
         """Return the faults by device; empty if all are healthy."""
-        return {name: watch.fault for name, watch in self.monitors.items() if watch.fault is not None}
+        return {name: monitor.fault for name, monitor in self.monitors.items() if monitor.fault is not None}
 
     def healthy_since(self, since_s: float) -> bool:
         """Check that every device was found healthy after a monotonic time, and none has a fault."""
-        watches = self.monitors.values()
-        return all(w.fault is None and w.heard_s is not None and w.heard_s > since_s for w in watches)
+        monitors = self.monitors.values()
+        return all(each.fault is None and each.heard_s is not None and each.heard_s > since_s for each in monitors)
 
     def use(self, *, by_inspection: bool) -> None:
         """Leave camera and gripper to an inspection, or monitor them again; the arm is always monitored."""
@@ -175,10 +179,10 @@ class DeviceManager:
         """Return the active safety stop that only a person may end."""
         return next((fault for fault in self.faults.values() if _is_stop(fault)), None)
 
-    def renew_health(self, lease_s: float) -> None:
-        """Let the arm move for some seconds from now; its controller stops it when the lease runs out."""
+    def renew_health(self) -> None:
+        """Let the arm move for `HEALTH_LEASE_S` from now; its controller stops it when the lease runs out."""
         if self._arm is not None:
-            self._arm.renew_health(lease_s)
+            self._arm.renew_health(HEALTH_LEASE_S)
 
     async def halt(self) -> None:
         """Stop arm and gripper where they are. Never raises: the monitors find a device that does not answer."""
@@ -364,7 +368,7 @@ class DeviceManager:
         raise (self._not_activated or fault).again()
 
     async def _check_arm(self) -> None:
-        assert self._arm is not None  # noqa: S101 (the watch exists only with an arm)
+        assert self._arm is not None  # noqa: S101 (the monitor exists only with an arm)
         state = await self._arm.state()
         self.joints_rad, fault = state.joints_rad, state.fault
         stale = fault is not None and fault.cause is ArmCause.STALE

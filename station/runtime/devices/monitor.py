@@ -10,7 +10,7 @@ from station.devices.arm.faults import ArmFault
 from station.errors import StationError
 from station.messages import device as messages
 from station.messages.message import Message
-from station.messages.operation import INTERNAL_FAULT
+from station.messages.operation import internal_fault
 
 PERIOD_S = 0.25
 FIRST_PAUSE_S = 0.25
@@ -119,7 +119,8 @@ class DeviceMonitor:
     def _set(self, fault: StationError | None) -> None:
         before, self.fault = self.fault, fault
         if (before and before.message) != (fault and fault.message):
-            log.log(logging.WARNING if fault else logging.INFO, "%s: %s", self.name, fault.message if fault else "well")
+            level, text = (logging.WARNING, fault.message) if fault else (logging.INFO, "healthy")
+            log.log(level, "%s: %s", self.name, text)
         if _kind(before) != _kind(fault):
             self._on_change(fault)
 
@@ -129,7 +130,7 @@ def _fault_of(error: Exception) -> StationError:
     if isinstance(error, StationError):
         return error
     log.error("an unexpected error in the check of a device", exc_info=error)
-    return StationError(INTERNAL_FAULT(words=f"{type(error).__name__}: {error}"))
+    return StationError(internal_fault(error))
 
 
 def _kind(fault: StationError | None) -> object:

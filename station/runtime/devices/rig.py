@@ -5,26 +5,34 @@ import contextlib
 import time
 from collections.abc import AsyncIterator, Callable, Collection, Coroutine
 from dataclasses import dataclass
+from typing import TypeVar
 
 from station.devices.arm.arm import Arm
 from station.devices.camera.interface import Camera, Frame, FrameFault, describe
 from station.devices.gripper.errors import GripperStoppedError, GripperTimeoutError
 from station.devices.gripper.interface import Gripper, GripperReading, MoveResult, ObjectState
 from station.errors import StationError
+from station.inspection.press import FINEST_STEP_MM
 from station.messages import grip as messages
 from station.messages.gripper import REMEDY_LATE
 from station.messages.message import Definition, Message
 from station.press.reference import are_open
-from station.press.rig import FINEST_STEP_MM, GripError, Position
+from station.press.rig import GripError, Position
 from station.settings.arm import PoseName
 from station.settings.recipe import Recipe
 
 FRAME_DEADLINE_S = 1.0
+"""Longest wait for one frame, s: an estimate."""
 _MOST_FAULTY_FRAMES = 10
-_HEALTH_LEASE_S = 2.0
+"""Frames with a fault in a row that end a press: an estimate."""
+HEALTH_LEASE_S = 2.0
+"""Time after which the controller stops an arm whose lease was not renewed, s: an estimate."""
 _FREE_WITHIN_MM = 1.0
 """How far short of a width beside a fruit jaws still let it go, mm: above the 2 counts of 0.4 mm within which the
 gripper counts as at its place, and below `FREED_BY_MM` of `station.inspection.second_press`."""
+
+
+T = TypeVar("T")
 
 
 class FramesError(GripError):
@@ -212,14 +220,18 @@ def _combined(after: Message | None, reason: Message, alone: Definition, with_sa
     return messages.FAILED_TWICE(reason=after, release=alone(reason=reason))
 
 
-async def at_once(*works: Coroutine[None, None, object]) -> None:
-    """Do several things, not begun yet, at once; if one fails the others are cancelled, and its error is raised."""
+async def at_once(*works: Coroutine[None, None, T]) -> list[T]:
+    """Do several things, not begun yet, at once; if one fails the others are cancelled, and its error is raised.
+
+    Returns:
+        Their results, in their order.
+    """
     try:
         async with asyncio.TaskGroup() as group:
-            for work in works:
-                group.create_task(work)
+            tasks = [group.create_task(work) for work in works]
     except ExceptionGroup as failed:
         raise failed.exceptions[0] from None
+    return [task.result() for task in tasks]
 
 
 @contextlib.asynccontextmanager
@@ -228,8 +240,8 @@ async def renewed_lease(arm: Arm | None) -> AsyncIterator[None]:
 
     async def renew(arm: Arm) -> None:
         while True:
-            arm.renew_health(_HEALTH_LEASE_S)
-            await asyncio.sleep(_HEALTH_LEASE_S / 4)
+            arm.renew_health(HEALTH_LEASE_S)
+            await asyncio.sleep(HEALTH_LEASE_S / 4)
 
     if arm is None:
         yield

@@ -15,8 +15,11 @@ PLC = "plc"
 PANEL = "panel"
 """Actor of a command from a panel without a logged-in person."""
 RETRY_S = 2.0
+"""Pause before entries that could not be written are tried again, s: an estimate."""
 FLUSH_S = 3.0
+"""Longest wait for the last entries at the process's end, s: an estimate."""
 MOST_WAITING = 10_000
+"""Entries in memory while the records cannot be written; beyond it the oldest are lost: an estimate."""
 
 AlarmChange: TypeAlias = Literal["acknowledged", "shelved", "unshelved", "reset"]
 
@@ -44,18 +47,15 @@ class AuditLogger:
             log.error("the audit trail loses its oldest unwritten row: %s", self._waiting.pop(0))
         self._queued.set()
 
-    def log_command(
-        self, who: str, command: str, subject: str, why_not: Message | None, role: str = "", **old: Any
-    ) -> None:
+    def log_command(self, by: tuple[str, str], command: str, subject: str, why_not: Message | None) -> None:
         """Queue the entry of a command that was carried out or refused.
 
         Args:
-            who: `plc`, `panel` or a person's name; also the role by default.
+            by: name and role of who gave it.
             why_not: reason of the refusal; None if it was carried out.
-            **old: values before the command, where they matter.
         """
         new = {"done": why_not is None} | ({} if why_not is None else {"why": str(why_not)})
-        self.log(AuditEntry(who, role or who, f"command.{command}", subject, "", old or None, new))
+        self.log(AuditEntry(*by, f"command.{command}", subject, "", None, new))
 
     async def run(self) -> None:
         """Write the queue until cancelled."""

@@ -11,7 +11,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from station.channel.panel_maintenance_queries import PartHealth
+from station.channel.panel_maintenance import PartHealth
 from station.messages.message import Message
 from station.runtime.observability.metrics import Metrics
 from station.serving.guard import GuardedListener, Limits

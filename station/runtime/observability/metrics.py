@@ -89,8 +89,8 @@ class Metrics(Collector):
         """Count a fruit that is pressed once more, by the recipe's name."""
         self._of("second_presses", fruit=fruit).inc()
 
-    def frame(self, state: str = "good", number: int = 1) -> None:
-        """Count frames: `good`, `dropped`, or the name of a `FrameFault`."""
+    def frame(self, state: str, number: int = 1) -> None:
+        """Count frames of one state: `good`, or a `FrameFault`."""
         self._of("frames", state=state).inc(number)
 
     def reference(self, age_s: float, drift_grey_levels: float) -> None:
@@ -193,8 +193,8 @@ class Metrics(Collector):
             yield from _of_records(self._status())
         if self._backup is not None:
             yield GaugeMetricFamily(TABLE["backup_timestamp"].name, TABLE["backup_timestamp"].help, self._backup())
-        if (told := self._outbox()) is not None:
-            yield from _of_outbox(told)
+        if (status := self._outbox()) is not None:
+            yield from _of_outbox(status)
 
 
 def _made(row: Row, around_deadline: tuple[float, ...], registry: CollectorRegistry) -> Any:
@@ -234,18 +234,18 @@ def _of_records(status: Status) -> Iterator[Metric]:
 def _of_outbox(status: OutboxStatus) -> Iterator[Metric]:
     """Yield the outbox's metrics."""
     now_utc_ms = utc_ms()
-    told = status.destinations.items()
+    destinations = status.destinations.items()
 
     def age_s(utc_ms: int | None) -> float:
         return 0.0 if utc_ms is None else max(0.0, (now_utc_ms - utc_ms) / 1000)
 
     gauges: Values = {
-        "outbox_connected": {(name,): each.connected for name, each in told},
-        "outbox_waiting": {(name,): each.waiting for name, each in told},
-        "outbox_lag": {(name,): age_s(each.waiting_since_utc_ms) for name, each in told},
+        "outbox_connected": {(name,): each.connected for name, each in destinations},
+        "outbox_waiting": {(name,): each.waiting for name, each in destinations},
+        "outbox_lag": {(name,): age_s(each.waiting_since_utc_ms) for name, each in destinations},
         "outbox_age": {(): age_s(status.utc_ms)},
     }
-    yield from _families(gauges, {"outbox_refused": {(name,): each.refused for name, each in told}})
+    yield from _families(gauges, {"outbox_refused": {(name,): each.refused for name, each in destinations}})
 
 
 def _families(gauges: Values, counters: Values) -> Iterator[Metric]:

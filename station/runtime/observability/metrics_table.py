@@ -6,12 +6,12 @@ bytes as base units, `_total` for counters. Lengths and areas are in mm and mm²
 
 from typing import Literal, NamedTuple
 
-from station.channel.line import Reason, Refusal
 from station.devices.camera.interface import FrameFault
 from station.inspection.alarm_table import ALARMS
 from station.press.reference import ALARMS as REFERENCE_ALARMS
 from station.records.errors import RecordsDeadlineError
 from station.records.writer import CONCERNING_ALL
+from station.vocabulary import Reason, Refusal
 
 OTHER = "other"
 """Label value for a value that is not one of its own, or one too many."""

@@ -36,8 +36,8 @@ def start_entries(
     text = json.dumps(values, sort_keys=True)
     before = json.loads(state_files.read(_LAST) or b"null")
     sha256 = hashlib.sha256(text.encode()).hexdigest()
-    told = {"boot": boot, "configuration_sha256": sha256, **versions} | ({"broken": broken} if broken else {})
-    start = AuditEntry(STATION, STATION, "service.started", "station", "", None, told)
+    new = {"boot": boot, "configuration_sha256": sha256, **versions} | ({"broken": broken} if broken else {})
+    start = AuditEntry(STATION, STATION, "service.started", "station", "", None, new)
 
     def confirm() -> bool:
         return state_files.write(_LAST, text.encode())

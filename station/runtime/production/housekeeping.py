@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from station.devices.gripper.errors import GripperFaultError, GripperNotActiveError
 from station.errors import StationError
 from station.inspection.alarm_table import AlarmId
-from station.inspection.cycle import Event
+from station.inspection.cycle import WAITING_FOR_DEVICES, Event
 from station.inspection.states import State
 from station.memory import return_freed_memory
 from station.messages import operation as messages
@@ -19,22 +19,29 @@ from station.runtime.production.production import Production
 from station.settings.configuration import Configuration
 from station.supervision import restarts
 
-UPKEEP = "upkeep"
+HOUSEKEEPING = "upkeep"
+"""The task's name in /livez."""
 PERIOD_S = 0.2
+"""Pause between rounds, s: an estimate."""
 _ALARMS_EVERY_S = 1.0
-_BOOK_EVERY_S = 2.0
+"""Time between checks of the alarms' conditions, s: an estimate."""
+_RECIPES_EVERY_S = 2.0
+"""Time between checks of the recipes' files, s: an estimate."""
 _DAMAGE_EVERY_S = 10.0
+"""Time between checks of the records' files, s: an estimate."""
 _MEMORY_EVERY_S = 60.0
 """Images leave memory free between lasting objects, which is returned so often at most: an estimate, docs/soak.md."""
 _LONGEST_RECOVERY_S = 300.0
 """A recovery that takes longer counts as stuck, as one of records on a disk that hangs, and the process is started
 again. An estimate: the arm's program takes up to `arm.recovery_deadline_s`, a large database longer than any device."""
 _CLOCK_STEP_S = 2.0
+"""Least step of the wall clock against the monotonic clock between two checks that is an alarm, s: an estimate."""
 _RECIPE_WITHIN_S = 10.0
 """The line's time to choose a recipe, before its absence is an alarm."""
 _MANY_RESTARTS, _MANY_WITHIN_S = 3, 60.0
+"""Restarts of one process that are an alarm, within a time, s: estimates."""
 _MB = 1_000_000
-_AWAY = {State.UNKNOWN, State.HELD}
+
 _BETWEEN = {State.IDLE, State.RETREATING, State.RETREATING_READY, State.RETREATING_ACCEPTED}
 """No image is captured or measured. A line at full pace triggers during the retreat, and IDLE is rarely seen."""
 
@@ -56,10 +63,10 @@ class Housekeeping:
         broken: Message | None,
     ) -> None:
         self._service, self._devices, self._interlock = production.service, production.devices, production.interlock
-        self._plc_commands, self._recipes = production.plc_commands, production.recipes
+        self._line_state, self._recipes = production.line_state, production.recipes
         self._metrics, self._liveness, self._audit = observability.metrics, observability.liveness, observability.audit
         self._conditions, self._broken = conditions, broken
-        self._book_at_s = time.monotonic()
+        self._recipes_at_s = time.monotonic()
         self._reserve_mb = configuration.records.free_reserve_mb
         self._longest_pause_s = configuration.service.retry_longest_s
         self._logged_ready_s = 0.0
@@ -84,14 +91,14 @@ class Housekeeping:
 
     async def _run(self) -> None:
         while True:
-            if self._recovery is not None or self._service.state in _AWAY:
+            if self._recovery is not None or self._service.state in WAITING_FOR_DEVICES:
                 await self._recover()
             else:
                 self._pause_s, self._again_s = PERIOD_S, 0.0
             if time.monotonic() - self._alarms_at_s > _ALARMS_EVERY_S:
                 self._alarms_at_s = time.monotonic()
                 self._update_alarms()
-            if time.monotonic() - self._book_at_s > _BOOK_EVERY_S:
+            if time.monotonic() - self._recipes_at_s > _RECIPES_EVERY_S:
                 await self._refresh_recipes()
             if self._service.state in _BETWEEN and time.monotonic() - self._damage_at_s > _DAMAGE_EVERY_S:
                 self._damage_at_s = time.monotonic()
@@ -101,13 +108,13 @@ class Housekeeping:
                 return_freed_memory()
             self._metrics.ready(ready=self._interlock.refusal()[0] is None)
             if self._recovery is None or time.monotonic() - self._recovery_began_s < _LONGEST_RECOVERY_S:
-                self._liveness.progress(UPKEEP)
+                self._liveness.progress(HOUSEKEEPING)
             await asyncio.sleep(PERIOD_S)
 
     async def _refresh_recipes(self) -> None:
         """Read what people changed in the recipes. The current lot does not change."""
         await asyncio.to_thread(self._recipes.refresh)
-        self._book_at_s = time.monotonic()
+        self._recipes_at_s = time.monotonic()
         self._audit.log(*self._recipes.take_noticed())
 
     async def _recover(self) -> None:
@@ -173,7 +180,7 @@ class Housekeeping:
         alarms.update(AlarmId.CALIBRATION_OLD, self._devices.calibration.alarm_detail())
         for alarm, detail in self._conditions.items():
             alarms.update(alarm, detail())
-        self._plc_commands.update_line_alarms()
+        self._line_state.update_alarms()
         self._count_restarts()
         self._check_clock()
 
@@ -182,7 +189,7 @@ class Housekeeping:
 
         At a normal start the recipe comes only after the line is enabled and the devices are found healthy.
         """
-        report, now_s = self._plc_commands.last_report, time.monotonic()
+        report, now_s = self._line_state.last_report, time.monotonic()
         wanted = report is not None and report.enabled and self._service.state is State.IDLE
         if self._service.active is not None or not wanted:
             self._recipe_wanted_s = None

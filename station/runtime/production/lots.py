@@ -3,15 +3,16 @@
 import asyncio
 import logging
 
-from station.channel.panel_live import LONGEST_LOT
 from station.errors import StationError
 from station.messages import lots as messages
-from station.messages.message import Message, message_of
+from station.messages import readiness
+from station.messages.message import Message, joined, message_of
 from station.records.audit import STATION, AuditEntry
 from station.runtime.cycle.service import Service
 from station.runtime.observability.audit_logger import PLC, AuditLogger
 from station.runtime.recipes.active import ActiveRecipe, ActiveRecipes
 from station.state_files import StateFiles
+from station.vocabulary import LONGEST_LOT
 
 _NAMED = "named_lot"
 
@@ -61,6 +62,12 @@ class LotManager:
         self.mismatch = None
         self._service.set_active(active)
         return await self._store()
+
+    def no_recipe(self) -> Message:
+        """Return why no recipe is active, and how one is chosen."""
+        numbers = ", ".join(map(str, self._recipes.numbers))
+        choose = readiness.NO_RECIPE(numbers=numbers) if numbers else readiness.NO_RECIPE_AT_ALL()
+        return choose if self.mismatch is None else joined((self.mismatch, choose))
 
     def lot_of(self, named_by_plc: str) -> str:
         """Return the lot of a fruit, for which the PLC's name may be empty."""

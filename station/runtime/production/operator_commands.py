@@ -9,7 +9,7 @@ from sqlalchemy import Connection
 
 from station.channel.line import Command, CommandName
 from station.channel.panel import Recover, RecoveryName
-from station.channel.panel_live import LONGEST_LOT, OperatorCommand, OperatorCommandName, OperatorCommandView
+from station.channel.panel_run import OperatorCommand, OperatorCommandName, OperatorCommandView
 from station.clock import utc_ms
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.errors import StationError
@@ -18,7 +18,7 @@ from station.inspection.states import State
 from station.messages import commands as messages
 from station.messages import lots
 from station.messages.message import Message, message_of
-from station.messages.operation import INTERNAL_FAULT
+from station.messages.operation import internal_fault
 from station.records.errors import RecordsError
 from station.records.lots import end_lot, read_lots, start_lot
 from station.records.records import Records
@@ -27,6 +27,7 @@ from station.runtime.devices.manager import ARM, DeviceManager
 from station.runtime.observability.audit_logger import AuditLogger
 from station.runtime.production.lots import LotManager, is_lot_name
 from station.runtime.production.plc_commands import PlcCommands
+from station.vocabulary import LONGEST_LOT
 
 AT_ONCE_S = 0.4
 """Longest time for which a command's answer waits for the command's end."""
@@ -141,7 +142,7 @@ class OperatorCommands:
             why = message_of(error)
         except Exception as error:  # the pages must not show for ever that it is in progress
             log.exception("order %s", request.order)
-            why = INTERNAL_FAULT(words=f"{type(error).__name__}: {error}")
+            why = internal_fault(error)
         ended = entry.model_copy(
             update={"state": "done" if why is None else "failed", "why": why, "ended_utc_ms": utc_ms()}
         )
@@ -152,7 +153,7 @@ class OperatorCommands:
         if order is OperatorCommandName.CALL_OFF and argument:
             if argument != str(self._service.registry.running_sequence):
                 why = messages.ANOTHER_FRUIT(sequence=argument)
-                self._audit.log_command(by[0], order, argument, why, by[1])
+                self._audit.log_command(by, order, argument, why)
                 return why
             argument = ""  # the command itself has none
         if order in _COMMANDS:
@@ -169,7 +170,7 @@ class OperatorCommands:
                 why = await self._start_lot(argument, request.grower, by)
             case _:
                 why = await self._end_lot(argument, by)
-        self._audit.log_command(by[0], order, argument, why, by[1])
+        self._audit.log_command(by, order, argument, why)
         return why
 
     async def _recover(self, what: str, by: tuple[str, str]) -> Message | None:

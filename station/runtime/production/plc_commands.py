@@ -1,4 +1,4 @@
-"""PLC commands between fruits, and the line's state as the PLC interface reports it."""
+"""PLC commands: carried out between fruits, also where an operator gives them at the panel."""
 
 import asyncio
 import contextlib
@@ -6,23 +6,28 @@ import logging
 import time
 from typing import Any
 
-from station.channel.line import Command, CommandDone, CommandName, Line, RegisterView
+from station.channel.line import Command, CommandDone, CommandName
 from station.channel.panel import Recover
 from station.channel.server import is_expired
 from station.devices.arm.faults import ArmFault
 from station.devices.camera.interface import CameraError
 from station.errors import BadInputError
-from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import UNJUDGED, WAITING, Event
 from station.inspection.states import STATES, State
 from station.messages import commands as messages
 from station.messages import operation, readiness
 from station.messages.maintenance import UNDER_WAY
-from station.messages.message import Message, joined, message_of
+from station.messages.message import Message, message_of
 from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import DeviceManager
-from station.runtime.observability.audit_logger import PANEL, PLC, AlarmChange, alarm_entry, command_entry
-from station.runtime.observability.observability import Observability
+from station.runtime.observability.audit_logger import (
+    PANEL,
+    PLC,
+    AlarmChange,
+    AuditLogger,
+    alarm_entry,
+    command_entry,
+)
 from station.runtime.production.lots import LotManager
 from station.runtime.recipes.active import ActiveRecipes
 from station.state_files import StateFiles
@@ -32,8 +37,8 @@ log = logging.getLogger(__name__)
 
 DEADLINE_S = 25.0
 """With the wait for the command before. Less than the PLC interface's own deadline for a command."""
-LINE_SILENT_S = 2.0
 STOP_WITHIN_S = 0.5
+"""Longest wait for a stop to be stored before it is carried out, s: an estimate."""
 PRODUCTION, MAINTENANCE, MANUAL = 1, 2, 3
 """PackML's unit modes; in manual mode a person moves things by hand."""
 MODES = (PRODUCTION, MAINTENANCE, MANUAL)
@@ -54,37 +59,18 @@ class PlcCommands:
         recipes: ActiveRecipes,
         lots: LotManager,
         state_files: StateFiles,
-        observability: Observability,
+        audit: AuditLogger,
     ) -> None:
         self._service, self._devices, self._recipes = service, devices, recipes
-        self._lots, self._state_files = lots, state_files
-        self._metrics, self._audit = observability.metrics, observability.audit
+        self._lots, self._state_files, self._audit = lots, state_files, audit
         self.mode = PRODUCTION
         self.recipe_changing = False
-        self.registers_wanted = False
-        """The PLC interface's registers are wanted with its next beat."""
-        self.registers: tuple[tuple[RegisterView, ...], float] = ((), 0.0)
-        """The PLC's registers as last reported, and their monotonic time; none and 0 before the first report."""
-        self.last_report: Line | None = None
-        """The PLC interface's last message; None if there was none."""
-        self._line_at_s: float | None = None
-        self._failed_rejects: list[Message] = []
-        """Failed reject actuations as last reported, the oldest first."""
         self._turn = asyncio.Lock()
         self._stop_wanted = False
         """By the last order of a person, also before its file has it."""
         self._stop_file, self._mode_file = asyncio.Lock(), asyncio.Lock()
         self._storing_mode: asyncio.Task[bool] | None = None
         self._storing_reset: asyncio.Task[bool] | None = None
-
-    @property
-    def line_age_s(self) -> float | None:
-        """Return the time since the PLC interface's last message; None if there was none."""
-        return None if self._line_at_s is None else time.monotonic() - self._line_at_s
-
-    def request_registers(self) -> None:
-        """Request the PLC interface's registers with its next beat."""
-        self.registers_wanted = True
 
     def restore(self) -> None:
         """Restore after a restart a person's stop, which lasts until a reset, and the mode.
@@ -105,53 +91,6 @@ class PlcCommands:
         async with self._stop_file:
             wanted = b"yes" if self._stop_wanted else b"no"
             return await asyncio.to_thread(self._state_files.write, _STOPPED, wanted)
-
-    def set_line(self, line: Line) -> None:
-        """Store the PLC interface's beat."""
-        self.last_report, self._line_at_s = line, time.monotonic()
-        if line.registers:
-            self.registers, self.registers_wanted = (line.registers, time.monotonic()), False
-        self._metrics.heard("plc_interface")
-        self._metrics.waiting(line.waiting)
-        if line.plc_alive or (line.plc_connected and not line.enable_withdrawn):  # one that never beats is served too
-            self._metrics.heard("plc")
-
-    def line_fault(self) -> Message | None:
-        """Return the line's fault, as far as known."""
-        age_s = self.line_age_s
-        if self.last_report is None or age_s is None:
-            return None
-        if age_s > LINE_SILENT_S:
-            return operation.INTERFACE_SILENT(age_s=age_s)
-        report = self.last_report
-        if report.plc_alive or not report.enable_withdrawn:
-            return None  # one that is enabled and has not beaten yet, or never beats, is served and not monitored
-        return operation.HEARTBEAT_STILL() if report.plc_connected else operation.PLC_GONE()
-
-    def update_line_alarms(self) -> None:
-        """Raise and clear the alarms of the line's state."""
-        age_s, line, alarms = self.line_age_s, self.last_report, self._service.alarms
-        if line is None or age_s is None:
-            return
-        silent = age_s > LINE_SILENT_S
-        alarms.update(AlarmId.PLC_INTERFACE_LOST, self.line_fault() if silent else None)
-        alarms.update(AlarmId.PLC_HEARTBEAT_LOST, None if silent else self.line_fault())
-        faults = {fault.part: fault.what for fault in reversed(line.faults)}
-        self._update_reject_alarm([fault.what for fault in line.faults if fault.part == "reject"])
-        alarms.update(AlarmId.CAN_NODE_LOST, faults.get("can"))
-        alarms.update(AlarmId.PLC_JOURNAL_NOT_WRITABLE, faults.get("journal"))
-
-    def _update_reject_alarm(self, failures: list[Message]) -> None:
-        """Raise the alarm anew for each failed reject actuation: every one may have left a fruit among the good ones.
-
-        The PLC interface reports a failure until the PLC's `clear_error`, also after a person has acknowledged it.
-        """
-        new = [failure for failure in failures if failure not in self._failed_rejects]
-        self._failed_rejects = failures
-        if new or not failures:
-            self._service.alarms.clear(AlarmId.GATE_NOT_FIRED)
-        if new:
-            self._service.alarms.raise_(AlarmId.GATE_NOT_FIRED, joined(new))
 
     async def execute(self, command: Command, by: tuple[str, str] = (PLC, PLC)) -> CommandDone:
         """Execute one command by the name and role of who gave it."""
@@ -288,7 +227,7 @@ class PlcCommands:
             why = None
         except ArmFault as fault:
             why = message_of(fault)
-        self._audit.log_command(by[0], "recover", request.what, why, by[1])
+        self._audit.log_command(by, "recover", request.what, why)
         return CommandDone(done=why is None, why=why)
 
     async def _call_off(self) -> Message | None:
@@ -352,7 +291,7 @@ class PlcCommands:
             return UNDER_WAY(activity=activity)
         if state is State.STOPPED:
             service.runner.post(Event.RESET)
-        elif state in {State.LATCHED, State.CARRIED}:
+        elif STATES[state].needs_person:
             service.runner.post(Event.PERSON_CONFIRMED, operation.RESET())
         return await self._until_ready()
 

@@ -1,20 +1,19 @@
 """Readiness for a trigger, or the reason against it: one sentence with the remedy."""
 
 from station.channel.line import StationState
-from station.channel.panel_maintenance_queries import PartHealth
+from station.channel.panel_maintenance import PartHealth
+from station.inspection.cycle import WAITING_FOR_DEVICES
 from station.inspection.states import STATES, State
 from station.messages import readiness as messages
-from station.messages.message import Message, joined, message_of
+from station.messages.message import Message, message_of
 from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import DeviceManager
 from station.runtime.observability.health import Readiness
 from station.runtime.observability.observability import Observability
+from station.runtime.production.line_state import LineState
 from station.runtime.production.lots import LotManager
 from station.runtime.production.plc_commands import PRODUCTION, PlcCommands
-from station.runtime.recipes.active import ActiveRecipes
 from station.vocabulary import PackmlState, Refusal
-
-_DEVICES_DECIDE = {State.UNKNOWN, State.HELD}
 
 
 class Interlock:
@@ -24,13 +23,13 @@ class Interlock:
         self,
         service: Service,
         devices: DeviceManager,
-        plc_commands: PlcCommands,
-        recipes: ActiveRecipes,
         lots: LotManager,
+        plc_commands: PlcCommands,
+        line_state: LineState,
         observability: Observability,
     ) -> None:
-        self._service, self._devices, self._plc_commands = service, devices, plc_commands
-        self._recipes, self._lots = recipes, lots
+        self._service, self._devices, self._lots = service, devices, lots
+        self._plc_commands, self._line_state = plc_commands, line_state
         self._boot, self._liveness = observability.boot, observability.liveness
 
     def refusal(self) -> tuple[Refusal | None, Message | None]:
@@ -52,18 +51,12 @@ class Interlock:
         if self._plc_commands.recipe_changing:
             return Refusal.RECIPE_CHANGING, messages.RECIPE_CHANGING()
         if service.active is None:
-            return Refusal.NOT_READY, self._no_recipe()
+            return Refusal.NOT_READY, self._lots.no_recipe()
         if why := self._devices.calibration.refusal():
             return Refusal.NOT_READY, why
         if self._plc_commands.mode != PRODUCTION:
             return Refusal.NOT_READY, messages.NOT_PRODUCTION()
         return None, None
-
-    def _no_recipe(self) -> Message:
-        numbers = ", ".join(map(str, self._recipes.numbers))
-        choose = messages.NO_RECIPE(numbers=numbers) if numbers else messages.NO_RECIPE_AT_ALL()
-        mismatch = self._lots.mismatch
-        return choose if mismatch is None else joined((mismatch, choose))
 
     def state(self) -> StationState:
         """Return the whole state, as the PLC interface gets it with every beat."""
@@ -82,7 +75,7 @@ class Interlock:
             error_code=service.alarms.alarms.error_code,
             alarms=service.alarms.alarms.word,
             simulated=self._devices.simulated,
-            registers_wanted=self._plc_commands.registers_wanted,
+            registers_wanted=self._line_state.registers_wanted,
         )
 
     def _packml(self) -> PackmlState | None:
@@ -91,17 +84,17 @@ class Interlock:
         return PackmlState.STOPPING if self._service.ending and not facts.may_exit else facts.packml
 
     def readiness(self) -> Readiness:
-        """Return the same for supervisors, with every dependency's age."""
+        """Return the readiness for /readyz, with every dependency's age."""
         refusal, why = self.refusal()
         devices = [
             PartHealth(
                 name=name,
-                state="ok" if watch.fault is None else "fault" if watch.heard_s is not None else "unknown",
-                age_s=watch.age_s,
-                detail=None if watch.fault is None else message_of(watch.fault),
-                remedy=None if watch.fault is None else messages.SEE_DEVICES(),
+                state="ok" if monitor.fault is None else "fault" if monitor.heard_s is not None else "unknown",
+                age_s=monitor.age_s,
+                detail=None if monitor.fault is None else message_of(monitor.fault),
+                remedy=None if monitor.fault is None else messages.SEE_DEVICES(),
             )
-            for name, watch in self._devices.monitors.items()
+            for name, monitor in self._devices.monitors.items()
         ]
         return Readiness(refusal is None, why, (*devices, self._records(), self._line()))
 
@@ -112,16 +105,16 @@ class Interlock:
         return PartHealth(name="records", state="fault", age_s=age_s, detail=fault.cause, remedy=fault.remedy)
 
     def _line(self) -> PartHealth:
-        age_s = self._plc_commands.line_age_s
+        age_s = self._line_state.age_s
         if age_s is None:
             why, remedy = messages.PLC_NOT_HEARD(), messages.START_PLC()
             return PartHealth(name="plc", state="unknown", age_s=None, detail=why, remedy=remedy)
-        if trouble := self._plc_commands.line_fault():
+        if trouble := self._line_state.fault():
             return PartHealth(name="plc", state="fault", age_s=age_s, detail=trouble, remedy=messages.SEE_DETAIL())
         return PartHealth(name="plc", state="ok", age_s=age_s)
 
     def _trouble(self) -> Message | None:
-        if self._service.state not in _DEVICES_DECIDE:
+        if self._service.state not in WAITING_FOR_DEVICES:
             return None
         fault = next(iter(self._devices.faults.values()), self._service.registry.fault)
         return None if fault is None else message_of(fault)

@@ -138,9 +138,9 @@ class ActiveRecipes:
         """
         data = self._state_files.read(_ACTIVE)
         try:
-            told = json.loads(data or b"null")
-            active = ActiveRecipe.of(Recipe.model_validate_json(json.dumps(told["values"])), told["revision"])
-            lot, sha256 = told["lot"], told["sha256"]
+            stored = json.loads(data or b"null")
+            active = ActiveRecipe.of(Recipe.model_validate_json(json.dumps(stored["values"])), stored["revision"])
+            lot, sha256 = stored["lot"], stored["sha256"]
         except (ValueError, TypeError, KeyError):
             return None
         try:
@@ -153,8 +153,8 @@ class ActiveRecipes:
     def store_active(self, active: ActiveRecipe, lot: str | None) -> bool:
         """Store the active recipe for the next start, with the lot under way, if any; return whether it was stored."""
         snapshot = active.snapshot
-        told = {"lot": lot, "revision": snapshot.revision, "sha256": snapshot.sha256}
-        return self._state_files.write(_ACTIVE, json.dumps({**told, "values": json.loads(snapshot.text)}).encode())
+        data = {"lot": lot, "revision": snapshot.revision, "sha256": snapshot.sha256}
+        return self._state_files.write(_ACTIVE, json.dumps({**data, "values": json.loads(snapshot.text)}).encode())
 
     def _is_revision(self, active: ActiveRecipe) -> bool:
         """Check that the history has exactly this content as this revision."""
@@ -180,16 +180,16 @@ class ActiveRecipes:
             changes = str(state.file_state)
             if control and file:
                 changes = str(described_differences(control.recipe, file.recipe))
-            told = {"state": str(state.file_state), "sha256": sha256, "changes": changes}
+            data = {"state": str(state.file_state), "sha256": sha256, "changes": changes}
             entry = AuditEntry(
-                STATION, STATION, "recipe.file_noticed", f"recipe {state.name}", str(state.note or "")[:900], None, told
+                STATION, STATION, "recipe.file_noticed", f"recipe {state.name}", str(state.note or "")[:900], None, data
             )
             self._entries.append(entry)
 
     def _store_controls(self, controls: dict[str, Control]) -> None:
         for name, control in controls.items():
-            told = {"revision": control.revision, "values": control.recipe.model_dump(mode="json")}
-            self._state_files.write(f"{_CONTROLS}/{name}.json", json.dumps(told).encode())
+            data = {"revision": control.revision, "values": control.recipe.model_dump(mode="json")}
+            self._state_files.write(f"{_CONTROLS}/{name}.json", json.dumps(data).encode())
         for name in set(self._stored_names()) - set(controls):
             with contextlib.suppress(OSError):
                 (self._state_files.folder / _CONTROLS / f"{name}.json").unlink()
@@ -198,10 +198,10 @@ class ActiveRecipes:
         found = {}
         for name in self._stored_names():
             try:
-                told = json.loads(self._state_files.read(f"{_CONTROLS}/{name}.json") or b"null")
-                found[name] = Control(Recipe.model_validate_json(json.dumps(told["values"])), int(told["revision"]))
+                stored = json.loads(self._state_files.read(f"{_CONTROLS}/{name}.json") or b"null")
+                found[name] = Control(Recipe.model_validate_json(json.dumps(stored["values"])), int(stored["revision"]))
             except (ValueError, TypeError, KeyError):
-                continue  # of another form of the program
+                continue  # of another schema version
         return found
 
     def _stored_names(self) -> list[str]:

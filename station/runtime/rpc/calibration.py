@@ -17,7 +17,7 @@ from station.calibration.rig import Place, Progress, Unit
 from station.calibration.store import CalibrationStore, Prepared
 from station.calibration.verification_procedure import VerificationProcedure
 from station.channel.panel import Actor
-from station.channel.panel_maintenance_queries import (
+from station.channel.panel_maintenance import (
     CalibrationRunView,
     CalibrationState,
     CalibrationView,
@@ -36,7 +36,7 @@ from station.inspection.states import STATES, State
 from station.messages import calibration as messages
 from station.messages.maintenance import UNDER_WAY
 from station.messages.message import Message, joined, message_of
-from station.messages.operation import INTERNAL_FAULT
+from station.messages.operation import internal_fault
 from station.records.audit import AuditEntry, append_audit
 from station.records.records import Records
 from station.runtime.devices.calibration_rig import CalibrationRig
@@ -201,7 +201,7 @@ class PanelCalibration:
                 self._devices.report_fault(error)
         except Exception as error:  # the page must not show for ever that it runs
             log.exception("the %s at the panel", run.kind)
-            run.state, run.result = "failed", INTERNAL_FAULT(words=f"{type(error).__name__}: {error}")
+            run.state, run.result = "failed", internal_fault(error)
         else:
             run.state, run.result = ("passed", None) if result is None else ("failed", result)
         finally:

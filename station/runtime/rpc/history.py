@@ -1,7 +1,7 @@
 """Requests of the pages that change lots, and that note exports."""
 
 from station.channel.line import Noted
-from station.channel.panel_queries import EndLot, LotView, NoteExport, StartLot
+from station.channel.panel_lots import EndLot, LotView, NoteExport, StartLot
 from station.channel.server import Handlers
 from station.records.audit import AuditEntry
 from station.records.lots import end_lot, start_lot

@@ -4,10 +4,12 @@ import logging
 from collections import deque
 from typing import Any, NamedTuple, Self
 
-from station.channel.panel_maintenance_queries import LogLine
+from station.channel.panel_maintenance import LogLine
 
 STORED_LINES = 1000
+"""Lines in memory: an estimate."""
 _LONGEST = 1000
+"""Characters of a line at most: an estimate."""
 
 
 class _Stored(NamedTuple):
@@ -49,8 +51,8 @@ class LogRing(logging.Handler):
 
 
 def _text(record: logging.LogRecord) -> str:
-    told: Any = record.msg
-    text = str(told.get("event", "")) if isinstance(told, dict) else record.getMessage()
+    message: Any = record.msg
+    text = str(message.get("event", "")) if isinstance(message, dict) else record.getMessage()
     if record.exc_info and record.exc_info[1] is not None:
         text = f"{text}: {type(record.exc_info[1]).__name__}: {record.exc_info[1]}"
     return text[:_LONGEST]

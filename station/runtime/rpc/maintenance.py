@@ -8,12 +8,13 @@ import cv2
 import numpy as np
 
 from station.channel.panel import Actor
-from station.channel.panel_maintenance_queries import (
+from station.channel.panel_maintenance import (
     HISTOGRAM_BINS,
     GetHealth,
     GetLiveImage,
     GetRegisters,
     Health,
+    ImageFile,
     Jogged,
     JogGripper,
     LedsSet,
@@ -23,10 +24,10 @@ from station.channel.panel_maintenance_queries import (
     Registers,
     SetLeds,
 )
-from station.channel.panel_queries import Picture
 from station.channel.server import Handlers
 from station.channel.worker import PanelWorker
 from station.devices.camera.interface import Frame, Image, Leds
+from station.devices.gripper.calibration import SLOWEST_MM_S, WEAKEST_N
 from station.errors import StationError
 from station.inspection.states import STATES, State
 from station.messages import maintenance as messages
@@ -41,18 +42,18 @@ from station.runtime.production.production import Production
 from station.runtime.rpc.log import LogRing
 from station.settings.segmentation import Segmentation
 from station.vision.contact import Contact, Method
-from station.vision.image_quality import sharpness
+from station.vision.image_quality import saturated_share, sharpness
 from station.vision.methods import make_method
 from station.vocabulary import Refusal
 
-JOG_SPEED_MM_S, JOG_FORCE_N = 20.0, 20.0
-"""The gripper's slowest and weakest."""
-FRAME_DEADLINE_S = 2.0
+LIVE_IMAGE_DEADLINE_S = 2.0
+"""Longest wait for the live image, s: an estimate."""
 REGISTERS_DEADLINE_S = 3.0
+"""Longest wait for the registers of the PLC interface's next beat, s: an estimate."""
 _JOGGED = {State.IDLE, State.STOPPED, State.CARRIED}
 """States in which the cycle moves nothing."""
-_SATURATED_LEVEL = 250
 _JPEG_QUALITY = 85
+"""Of the live image, 0 to 100: an estimate."""
 _WHITE, _BLACK = (255, 255, 255), (0, 0, 0)
 
 
@@ -77,7 +78,7 @@ class PanelMaintenance:
         log: LogRing,
     ) -> None:
         self._service, self._devices, self._interlock = production.service, production.devices, production.interlock
-        self._plc_commands, self._home = production.plc_commands, home
+        self._plc_commands, self._line_state, self._home = production.plc_commands, production.line_state, home
         self._audit, self._versions = observability.audit, dict(observability.versions)
         self._worker, self._log = worker, log
         self._moving = asyncio.Lock()
@@ -160,7 +161,7 @@ class PanelMaintenance:
             async with self._moving:
                 with self._service.manual(JOGGING(), self._devices.halt):
                     wide_mm = gripper.max_width_mm if width_mm is None else width_mm
-                    reading = (await gripper.move_to_width(wide_mm, JOG_SPEED_MM_S, JOG_FORCE_N)).reading
+                    reading = (await gripper.move_to_width(wide_mm, SLOWEST_MM_S, WEAKEST_N)).reading
         self._devices.monitors[GRIPPER].report_success()
         where = f"{reading.width_mm:.1f} mm"
         self._note(
@@ -182,7 +183,7 @@ class PanelMaintenance:
 
     async def live_image(self, request: GetLiveImage) -> LiveImage:
         """Return the newest image; it is measured only while nothing is inspected."""
-        frame = await self._devices.cell.camera.frame(request.newer_than_s, FRAME_DEADLINE_S)
+        frame = await self._devices.cell.camera.frame(request.newer_than_s, LIVE_IMAGE_DEADLINE_S)
         active = self._service.active
         why = None
         if request.contact and STATES[self._service.state].refusal is Refusal.BUSY:
@@ -195,12 +196,12 @@ class PanelMaintenance:
     async def registers(self, _request: GetRegisters) -> Registers:
         """Return the PLC's registers, requested with the next beat; after a while those of the last report."""
         asked_s = time.monotonic()
-        self._plc_commands.request_registers()
-        while self._plc_commands.registers[1] < asked_s and time.monotonic() < asked_s + REGISTERS_DEADLINE_S:
+        self._line_state.request_registers()
+        while self._line_state.registers[1] < asked_s and time.monotonic() < asked_s + REGISTERS_DEADLINE_S:
             await asyncio.sleep(0.05)
-        (told, at_s), report = self._plc_commands.registers, self._plc_commands.last_report
+        (registers, at_s), report = self._line_state.registers, self._line_state.last_report
         faults = () if report is None else tuple(each.what for each in report.faults if each.part == "handshake")
-        return Registers(registers=told, age_s=time.monotonic() - at_s if at_s else None, faults=faults)
+        return Registers(registers=registers, age_s=time.monotonic() - at_s if at_s else None, faults=faults)
 
     async def log_lines(self, request: ReadLog) -> Log:
         """Return the last lines of the log."""
@@ -224,12 +225,12 @@ class PanelMaintenance:
         blue, green, red = (_histogram(image[:, :, channel]) for channel in range(3))
         scale_mm = self._devices.calibration.in_force.mm_per_px
         return LiveImage(
-            picture=Picture(media_type="image/jpeg", data=data),
+            picture=ImageFile(media_type="image/jpeg", data=data),
             captured_s=frame.captured_s,
             age_s=time.monotonic() - frame.captured_s,
             faults=tuple(sorted(fault.value for fault in frame.faults)),
             histogram=(red, green, blue),
-            saturated_share=float(np.mean(image.max(axis=2) >= _SATURATED_LEVEL)),
+            saturated_share=saturated_share(image),
             sharpness=sharpness(image),
             area_px=contact.area_px if contact else None,
             area_mm2=contact.area_px * scale_mm**2 if contact else None,

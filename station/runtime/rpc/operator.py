@@ -6,7 +6,7 @@ import time
 from functools import partial
 
 from station.channel.line import Noted
-from station.channel.panel_live import (
+from station.channel.panel_run import (
     DeviceView,
     Fruit,
     GetFruit,
@@ -61,10 +61,10 @@ class PanelServer:
     ) -> None:
         self._configuration = configuration
         self._interlock, self._service, self._devices = production.interlock, production.service, production.devices
-        self._lots, self._book, self._plc_commands = production.lots, production.recipes, production.plc_commands
+        self._lots, self._recipes, self._line_state = production.lots, production.recipes, production.line_state
         self._records, self._alarms, self._audit = records, alarms, audit
         self._operator_commands = OperatorCommands(
-            self._plc_commands, self._service, self._devices, self._lots, records, audit
+            production.plc_commands, self._service, self._devices, self._lots, records, audit
         )
         self._inspections = RecentInspections(partial(read_counts, records.folder))
         self._heard_s: float | None = None
@@ -77,7 +77,7 @@ class PanelServer:
             GetRecent: self._recent,
             GetFruit: self._fruit,
             GetPicture: self._picture,
-            GetRecipes: self._recipes,
+            GetRecipes: self._list_recipes,
             OperatorCommand: self._operator_commands.start,
             PersonNoted: self._person,
             **alarms.handlers,
@@ -112,7 +112,7 @@ class PanelServer:
             self.flooded_by = request.flooded_by
         service, line = self._service, self._interlock.state()
         facts, active = STATES[service.state], service.active
-        report = self._plc_commands.last_report
+        report = self._line_state.last_report
         return PanelState(
             boot=line.boot,
             utc_ms=utc_ms(),
@@ -132,12 +132,12 @@ class PanelServer:
             plc_names_lots=self._lots.plc_names,
             plc_connected=report is not None and report.plc_connected,
             plc_alive=report is not None and report.plc_alive,
-            line_trouble=self._plc_commands.line_fault(),
+            line_trouble=self._line_state.fault(),
             check_due=self._devices.calibration.refusal(),
-            alarms=self._alarms.active(),
+            alarms=self._alarms.listed(),
             devices=tuple(
-                DeviceView(name=name, fault=message_of(watch.fault) if watch.fault else None, age_s=watch.age_s)
-                for name, watch in self._devices.monitors.items()
+                DeviceView(name=name, fault=message_of(monitor.fault) if monitor.fault else None, age_s=monitor.age_s)
+                for name, monitor in self._devices.monitors.items()
             ),
             orders=self._operator_commands.recent,
             may=self._operator_commands.possible,
@@ -159,13 +159,13 @@ class PanelServer:
     async def _picture(self, request: GetPicture) -> Picture:
         return await self._inspections.picture(request.sequence)
 
-    async def _recipes(self, _request: GetRecipes) -> Recipes:
-        found = [active for number in self._book.numbers if (active := self._book.find(number)) is not None]
+    async def _list_recipes(self, _request: GetRecipes) -> Recipes:
+        found = [active for number in self._recipes.numbers if (active := self._recipes.find(number)) is not None]
         active = self._service.active
         return Recipes(
             recipes=tuple(_recipe_view(each) for each in found),
             active=None if active is None else _recipe_view(active),
-            problems=self._book.problems,
+            problems=self._recipes.problems,
         )
 
     async def _person(self, request: PersonNoted) -> Noted:

@@ -1,4 +1,4 @@
-"""Channel server of the station: answers the PLC interface and the commands of people at the cell."""
+"""Channel server for the PLC interface: answers its requests and the commands of people at the cell."""
 
 import logging
 
@@ -17,7 +17,7 @@ from station.channel.line import (
     StationState,
 )
 from station.channel.panel import Recover
-from station.channel.server import ChannelServer, is_expired
+from station.channel.server import Handlers, is_expired
 from station.messages.operation import TRIGGER_GIVEN_UP
 from station.runtime.alarms.commands import AlarmCommands
 from station.runtime.production.production import Production
@@ -27,34 +27,22 @@ log = logging.getLogger(__name__)
 
 
 class PlcInterfaceServer:
-    """Server for the PLC interface, on an endpoint that is bound when it is made."""
+    """Channel server for the PLC interface."""
 
-    def __init__(
-        self,
-        endpoint: str,
-        production: Production,
-        alarms: AlarmCommands,
-    ) -> None:
-        self._service, self._plc_commands = production.service, production.plc_commands
+    def __init__(self, production: Production, alarms: AlarmCommands) -> None:
+        self._service, self._line_state = production.service, production.line_state
         self._interlock, self._lots = production.interlock, production.lots
-        self._server = ChannelServer(
-            endpoint,
-            {
-                Begin: self._begin,
-                AwaitOutcome: self._outcome,
-                Published: self._published,
-                Acknowledged: self._acknowledged,
-                Resume: self._resume,
-                Line: self._line,
-                Command: production.plc_commands.execute,
-                Recover: production.plc_commands.recover,
-                **alarms.handlers,
-            },
-        )
-
-    async def serve(self) -> None:
-        """Answer requests until cancelled."""
-        await self._server.serve()
+        self.handlers: Handlers = {
+            Begin: self._begin,
+            AwaitOutcome: self._outcome,
+            Published: self._published,
+            Acknowledged: self._acknowledged,
+            Resume: self._resume,
+            Line: self._line,
+            Command: production.plc_commands.execute,
+            Recover: production.plc_commands.recover,
+            **alarms.handlers,
+        }
 
     async def _begin(self, request: Begin) -> BeginReply:
         refusal, _ = self._interlock.refusal()
@@ -87,5 +75,5 @@ class PlcInterfaceServer:
         return await self._service.registry.open_inspections()
 
     async def _line(self, request: Line) -> StationState:
-        self._plc_commands.set_line(request)
+        self._line_state.report(request)
         return self._interlock.state()

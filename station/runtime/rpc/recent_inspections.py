@@ -6,21 +6,20 @@ import logging
 from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from station.channel.line import Outcome
-from station.channel.panel_live import Counts, CurvePointSummary, Fruit, FruitSummary, LimitView, Picture
+from station.channel.panel_run import Counts, CurvePointSummary, Fruit, FruitSummary, LimitView, Picture
 from station.devices.camera.interface import Image
 from station.errors import StationError
 from station.messages import jobs as messages
+from station.press.rig import MeasuredStep
 from station.records.errors import RecordsError
 from station.records.judgement import limit_factor
 from station.records.model import InspectionRecord
 from station.runtime.cycle.inspection import Inspection
-from station.runtime.imaging.worker import MeasuredStep
 from station.settings.recipe import Recipe
 from station.vision.contact import Mask
 
@@ -44,19 +43,15 @@ ReadCounts = Callable[[str, int], Mapping[str, int]]
 """Returns the records' counts of a lot's outcomes, of its fruit below a sequence; blocks."""
 
 
-class RestoredFruit(NamedTuple):
-    """A fruit of an earlier start of the station."""
-
-    fruit: Fruit
-    look: ReadStep | None
-    """None if no image was stored."""
-
-
 @dataclass(slots=True)
-class _Recent:
+class RecentFruit:
+    """A fruit with its picture, or what it is made of."""
+
     fruit: Fruit
     look: ReadStep | None
+    """None if no image was stored, or once the picture is made."""
     picture: Picture | None = None
+    """None before the first request."""
 
 
 class RecentInspections:
@@ -64,7 +59,7 @@ class RecentInspections:
 
     def __init__(self, read_counts: ReadCounts) -> None:
         self._read_counts = read_counts
-        self._by_sequence: OrderedDict[int, _Recent] = OrderedDict()
+        self._by_sequence: OrderedDict[int, RecentFruit] = OrderedDict()
         self._short: deque[FruitSummary] = deque(maxlen=MOST_IN_SHORT)
         self._lots: OrderedDict[str, Counter[str]] = OrderedDict()
         """In the order of their last use."""
@@ -79,11 +74,11 @@ class RecentInspections:
         return self._short[-1].sequence if self._short else None
 
     def restore(
-        self, short: Iterable[FruitSummary], full: Iterable[RestoredFruit], lots: Mapping[str, Mapping[str, int]]
+        self, short: Iterable[FruitSummary], full: Iterable[RecentFruit], lots: Mapping[str, Mapping[str, int]]
     ) -> None:
         """Restore the recent inspections of the previous start, oldest first, and each lot's count of outcomes."""
         self._short.extend(short)
-        self._by_sequence.update((each.fruit.short.sequence, _Recent(each.fruit, each.look)) for each in full)
+        self._by_sequence.update((each.fruit.short.sequence, each) for each in full)
         self._lots.update((name, Counter(counts)) for name, counts in lots.items())
 
     async def close(self) -> None:
@@ -97,7 +92,7 @@ class RecentInspections:
         if now.standing is None:
             return
         fruit, look = _new_fruit(now, now.published or now.standing)
-        self._by_sequence[fruit.short.sequence] = _Recent(fruit, look)
+        self._by_sequence[fruit.short.sequence] = RecentFruit(fruit, look)
         while len(self._by_sequence) > MOST_IN_FULL:
             self._by_sequence.popitem(last=False)
         self._short.append(fruit.short)
@@ -178,7 +173,7 @@ class RecentInspections:
             raise NotRecentError(messages.NO_PICTURE(sequence=sequence))
         return entry.picture
 
-    def _find(self, sequence: int) -> _Recent:
+    def _find(self, sequence: int) -> RecentFruit:
         entry = self._by_sequence.get(sequence)
         if entry is None:
             raise NotRecentError(messages.NOT_RECENT(sequence=sequence, number=MOST_IN_FULL))

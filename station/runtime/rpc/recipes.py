@@ -5,7 +5,7 @@ from pathlib import Path
 
 from station.channel.line import Noted
 from station.channel.panel import Actor
-from station.channel.panel_recipe_orders import (
+from station.channel.panel_recipes import (
     ApproveRecipe,
     ImportedRecipe,
     ImportRecipe,

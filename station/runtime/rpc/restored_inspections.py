@@ -12,7 +12,7 @@ import numpy as np
 from sqlalchemy import Connection
 
 from station.channel.line import Outcome
-from station.channel.panel_live import FruitSummary
+from station.channel.panel_run import FruitSummary
 from station.errors import StationError
 from station.messages import records as messages
 from station.records.database import plain, reading
@@ -23,7 +23,7 @@ from station.runtime.rpc.recent_inspections import (
     MOST_IN_FULL,
     MOST_IN_SHORT,
     ReadStep,
-    RestoredFruit,
+    RecentFruit,
     deciding_step,
     fruit_view,
     short_view,
@@ -51,7 +51,7 @@ class RestoredInspections(NamedTuple):
     """Arguments of `RecentInspections.restore`."""
 
     short: tuple[FruitSummary, ...]
-    full: tuple[RestoredFruit, ...]
+    full: tuple[RecentFruit, ...]
     lots: dict[str, Counter[str]]
 
 
@@ -95,7 +95,7 @@ def _counts(database: sqlite3.Connection, lot: str, below: int) -> Counter[str]:
 
 def _full(
     connection: Connection, folder: Path, sequence: int, deadline_s: Callable[[Recipe], float]
-) -> RestoredFruit | None:
+) -> RecentFruit | None:
     """Return a fruit in full; None if it is not known in full, as one that a crash ended."""
     record = read_inspection(connection, sequence, folder)
     snapshot, judged = record.trigger.recipe, record.judged
@@ -104,13 +104,13 @@ def _full(
     try:
         recipe = parse_recipe(snapshot.text, f"inspection@{sequence}")
         limit_s = deadline_s(recipe)
-    except StationError:  # of a form that this program does not take, or longer than this cell may take
+    except StationError:  # of another schema version, or longer than this cell may take
         return None
     step = deciding_step(judged)
     look = None if step is None else _step_reader(record, step)
     standing = _of_lot(record.standing, record.trigger.lot)
     fruit = fruit_view(standing, judged, recipe, snapshot.revision, limit_s, None if look is None else step)
-    return RestoredFruit(fruit, look)
+    return RecentFruit(fruit, look)
 
 
 def _of_lot(outcome: Outcome, lot: str) -> Outcome:

@@ -1,6 +1,6 @@
 """Facts for the guided first set-up: addresses, taught poses, the jaws' zero, calibration."""
 
-from station.channel.panel_live import SetupView
+from station.channel.panel_run import SetupView
 from station.runtime.devices.manager import ARM, CAMERA, GRIPPER, DeviceManager
 from station.runtime.imaging.golden_reference import GOLDEN
 from station.settings.arm import ArmPoses, ArmSettings

@@ -12,7 +12,7 @@ from benchmarks.monitoring.asking import panels, sql
 from benchmarks.monitoring.prometheus import RULES
 from hmi.run.routes import PARTS
 from hmi.web.translation import Locale
-from station.channel.panel_live import FruitSummary
+from station.channel.panel_run import FruitSummary
 from station.vocabulary import OutcomeName
 from station.whatif.outcome_table import counted
 from station.whatif.replay import Replayed

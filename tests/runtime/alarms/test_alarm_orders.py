@@ -123,6 +123,6 @@ def test_without_a_station_it_is_said(alarms, settings_file):
     async def scenario():
         code, said = await alarms("alarms", "list")
         assert code == 1
-        assert "gave no answer within 5 s when asked for its alarms; alarms are a running station's" in said
+        assert "did not answer ListAlarms within 5 s; alarms are a running station's" in said
 
     asyncio.run(scenario())

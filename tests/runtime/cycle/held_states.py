@@ -75,7 +75,7 @@ class Performer:
     async def halt(self) -> None:
         self.step()
 
-    def raise_alarm(self, told: Any, why: Any) -> None:
+    def raise_alarm(self, alarm: Any, why: Any) -> None:
         self.step()
 
     def entered(self, state: State, after: State, took_s: float) -> None:

@@ -63,8 +63,8 @@ class Script:
     async def halt(self):
         self.halts += 1
 
-    def raise_alarm(self, told, why):
-        self.alarms.append(told.alarm)
+    def raise_alarm(self, alarm, why):
+        self.alarms.append(alarm.alarm)
 
     def failed(self, fault): ...
 

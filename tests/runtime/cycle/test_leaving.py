@@ -8,7 +8,7 @@ import pytest
 from station.channel.client import ChannelClient
 from station.channel.line import CommandName
 from station.channel.panel import Actor
-from station.channel.panel_live import OperatorCommand, OperatorCommandName, OperatorCommandView
+from station.channel.panel_run import OperatorCommand, OperatorCommandName, OperatorCommandView
 from station.inspection.states import State
 from station.settings.gripper import GripperCalibration
 from station.settings.hmi import panel_endpoint

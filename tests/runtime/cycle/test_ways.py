@@ -134,7 +134,7 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
             assert places_of(cell) == ["above_nest"]
 
             crew = cell.station.service._devices
-            renew, crew.renew_health = crew.renew_health, lambda _lease_s: None
+            renew, crew.renew_health = crew.renew_health, lambda: None
             # A controller that stands still itself, as on a busy machine, forgives a silence: not this one.
             forgive, arm.script.stood_still = arm.script.stood_still, forgive_nothing
             restart, restarted = crew.restart_program, []

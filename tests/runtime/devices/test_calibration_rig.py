@@ -8,7 +8,7 @@ from unittest.mock import AsyncMock
 
 import pytest
 
-from station.channel.panel_maintenance_queries import ContinueCalibrationRun, StartCalibrationRun
+from station.channel.panel_maintenance import ContinueCalibrationRun, StartCalibrationRun
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
 from station.errors import StationError
 from station.inspection.states import STATES, State

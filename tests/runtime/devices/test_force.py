@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from station.channel.panel_maintenance_queries import JogGripper
+from station.channel.panel_maintenance import JogGripper
 from station.devices.gripper.calibration import force_setting, speed_setting
 from station.devices.gripper.link import State, Status
 from station.devices.gripper.robotiq import Robotiq2F85

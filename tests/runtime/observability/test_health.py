@@ -11,7 +11,7 @@ import urllib.request
 
 import pytest
 
-from station.channel.panel_maintenance_queries import PartHealth
+from station.channel.panel_maintenance import PartHealth
 from station.messages.message import verbatim
 from station.runtime.observability.health import HealthServer, Liveness, Readiness
 from station.serving.server import AddressError

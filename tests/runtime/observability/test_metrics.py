@@ -40,7 +40,7 @@ def everything_told(metrics, outcome):
     metrics.inspection("strawberry", failed)
     late = {"outcome": "NO_RESULT", "reasons": (Reason.LATE,), "late": True, "area_mm2": None, "closing_mm": None}
     metrics.inspection("", outcome.model_copy(update=late))
-    metrics.frame()
+    metrics.frame("good")
     metrics.frame("torn", 2)
     metrics.reference(3.0, 1.25)
     metrics.reference_refused(AlarmId.REFERENCE_BAD)

@@ -27,10 +27,10 @@ def made(state_files: Any = None):
         alarms=SimpleNamespace(alarms=SimpleNamespace(known={})),
         runner=SimpleNamespace(taken=lambda: asyncio.sleep(0)),
     )  # fmt: skip
-    observability: Any = SimpleNamespace(metrics=None, audit=SimpleNamespace(log=lambda *_: None))
+    audit: Any = SimpleNamespace(log=lambda *_: None)
     devices: Any = SimpleNamespace(faults={}, active_stop=None, power_missing=None, program_stopped=False)
     nothing: Any = None
-    return PlcCommands(service, devices, nothing, nothing, state_files, observability)
+    return PlcCommands(service, devices, nothing, nothing, state_files, audit)
 
 
 def test_a_command_that_waited_to_its_deadline_is_not_begun_afterwards(monkeypatch):

@@ -14,7 +14,7 @@ from station.messages.operation import CLOCK_BACK, CLOCK_FORWARD
 from station.runtime.devices.manager import GRIPPER
 from station.runtime.observability.health import Liveness
 from station.runtime.production import housekeeping
-from station.runtime.production.housekeeping import UPKEEP, Housekeeping
+from station.runtime.production.housekeeping import HOUSEKEEPING, Housekeeping
 from station.settings.configuration import Configuration
 
 RETREAT = {State.RETREATING, State.RETREATING_READY, State.RETREATING_ACCEPTED}
@@ -71,7 +71,7 @@ def housekeeping_of(records: SlowRecords, liveness: Liveness, on_round: Any, hom
     devices = SimpleNamespace(monitors={GRIPPER: gripper}, faults={}, needs_program_restart=False)
     nothing: Any = None
     production: Any = SimpleNamespace(
-        service=service, devices=devices, plc_commands=nothing, recipes=nothing,
+        service=service, devices=devices, line_state=nothing, recipes=nothing,
         interlock=SimpleNamespace(refusal=lambda: (None, None)),
     )  # fmt: skip
     seen: Any = SimpleNamespace(metrics=SimpleNamespace(ready=on_round), liveness=liveness, audit=nothing)
@@ -82,7 +82,7 @@ def housekeeping_of(records: SlowRecords, liveness: Liveness, on_round: Any, hom
 def test_a_slow_recovery_is_progress_until_its_own_limit(tmp_path, monkeypatch, longest_s):
     """Without it the PLC's heartbeat and the arm's program would stop, and the process be ended."""
     monkeypatch.setattr(housekeeping, "PERIOD_S", 0.01)
-    for period in ("_ALARMS_EVERY_S", "_BOOK_EVERY_S"):
+    for period in ("_ALARMS_EVERY_S", "_RECIPES_EVERY_S"):
         monkeypatch.setattr(housekeeping, period, float("inf"))
     if longest_s is not None:
         monkeypatch.setattr(housekeeping, "_LONGEST_RECOVERY_S", longest_s)
@@ -91,16 +91,16 @@ def test_a_slow_recovery_is_progress_until_its_own_limit(tmp_path, monkeypatch, 
     async def main():
         nonlocal now_s
         liveness, records, rounds = Liveness(lambda: now_s), SlowRecords(), asyncio.Semaphore(0)
-        liveness.watch(UPKEEP, progress_s)
-        upkeep = housekeeping_of(records, liveness, lambda **_: rounds.release(), tmp_path)
-        running = asyncio.create_task(upkeep.run())
+        liveness.watch(HOUSEKEEPING, progress_s)
+        housekeeping = housekeeping_of(records, liveness, lambda **_: rounds.release(), tmp_path)
+        running = asyncio.create_task(housekeeping.run())
         async with asyncio.timeout(30):
             await records.opening.wait()
             for _ in range(4):
                 now_s += 0.75 * progress_s
                 for _ in range(2):  # the round that was under way, and a whole one
                     await rounds.acquire()
-        assert set(liveness.stuck()) == (set() if longest_s is None else {UPKEEP})
+        assert set(liveness.stuck()) == (set() if longest_s is None else {HOUSEKEEPING})
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
         assert len(asyncio.all_tasks()) == 1, "the recovery has ended too"

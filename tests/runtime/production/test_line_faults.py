@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from station.channel.line import Line, LineFault
-from station.channel.panel_maintenance_queries import GetRegisters
+from station.channel.panel_maintenance import GetRegisters
 from station.inspection.alarm_table import AlarmId
 from station.inspection.alarms import AlarmState
 from station.messages.can import UNORDERED_REPORT
@@ -15,7 +15,7 @@ from station.messages.line import JOURNAL_NOT_WRITTEN
 from station.messages.message import verbatim
 from station.messages.operation import INTERFACE_SILENT
 from station.runtime.alarms.manager import AlarmManager
-from station.runtime.production.plc_commands import LINE_SILENT_S, PlcCommands
+from station.runtime.production.line_state import SILENT_S, LineState
 from station.runtime.rpc import maintenance
 from station.runtime.rpc.maintenance import PanelMaintenance
 
@@ -34,24 +34,21 @@ def alarms():
 
 
 @pytest.fixture
-def commands(alarms):
-    """The PLC commands of that station."""
-    service: Any = SimpleNamespace(alarms=alarms)
-    metrics = SimpleNamespace(heard=lambda _: None, waiting=lambda _: None)
-    observability: Any = SimpleNamespace(metrics=metrics, audit=None)
-    nothing: Any = None
-    return PlcCommands(service, nothing, nothing, nothing, nothing, observability)
+def line_state(alarms):
+    """The line state of that station."""
+    metrics: Any = SimpleNamespace(heard=lambda _: None, waiting=lambda _: None)
+    return LineState(alarms, metrics)
 
 
 @pytest.fixture
-def beat(commands):
+def beat(line_state):
     """Gives the station a beat with faults."""
 
     def given(*faults):
-        commands.set_line(
+        line_state.report(
             Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counters={}, faults=tuple(faults))
         )
-        commands.update_line_alarms()
+        line_state.update_alarms()
 
     return given
 
@@ -108,23 +105,23 @@ def test_a_fault_of_the_handshake_is_the_plcs_and_no_alarm(alarms, beat):
     assert active(alarms) == {}
 
 
-def test_an_interface_that_is_silent_is_an_alarm_of_its_own_and_not_the_plcs(alarms, commands, beat):
-    commands.update_line_alarms()
+def test_an_interface_that_is_silent_is_an_alarm_of_its_own_and_not_the_plcs(alarms, line_state, beat):
+    line_state.update_alarms()
     assert active(alarms) == {}, "one that has never beaten may not be there yet"
     beat()
     assert active(alarms) == {}
-    commands._line_at_s -= LINE_SILENT_S + 1
-    commands.update_line_alarms()
+    line_state._at_s -= SILENT_S + 1
+    line_state.update_alarms()
     (alarm,) = alarms.alarms.active
     assert (alarm.id, alarm.detail.id) == (AlarmId.PLC_INTERFACE_LOST, INTERFACE_SILENT.id)
     beat()
     assert active(alarms) == {}
 
 
-def test_the_page_of_the_registers_gets_the_handshakes_faults_alone(commands, beat, monkeypatch):
+def test_the_page_of_the_registers_gets_the_handshakes_faults_alone(line_state, beat, monkeypatch):
     monkeypatch.setattr(maintenance, "REGISTERS_DEADLINE_S", 0.0)
     page = PanelMaintenance.__new__(PanelMaintenance)
-    page._plc_commands = commands
+    page._line_state = line_state
 
     def faults():
         return asyncio.run(page.registers(GetRegisters())).faults

@@ -11,7 +11,7 @@ from station.channel.client import ChannelClient
 from station.channel.line import Begin, BeginReply, CommandName
 from station.channel.messages import DeadlineError
 from station.channel.panel import Actor
-from station.channel.panel_live import (
+from station.channel.panel_run import (
     Counts,
     GetPanelState,
     OperatorCommand,

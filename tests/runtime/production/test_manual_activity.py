@@ -6,8 +6,8 @@ import threading
 import pytest
 
 from station.channel.line import CommandName
-from station.channel.panel_live import GetPanelState, OperatorCommandName, PanelState
-from station.channel.panel_maintenance_queries import CalibrationState, GetCalibration, Jogged, JogGripper
+from station.channel.panel_maintenance import CalibrationState, GetCalibration, Jogged, JogGripper
+from station.channel.panel_run import GetPanelState, OperatorCommandName, PanelState
 from station.devices.gripper.errors import GripperStoppedError
 from station.errors import StationError
 from station.inspection.states import State
@@ -224,12 +224,12 @@ def test_an_orderly_end_keeps_the_arm_alive_until_the_ball_is_released_and_the_a
     async def scenario():
         monkeypatch.setattr(DeviceManager, "close", closed)
         async with at_ball(bench=False) as (cell, panel, entered):
-            devices, renewals = cell.station.service._devices, list[float]()
+            devices, renewals = cell.station.service._devices, list[None]()
             renew = devices.renew_health
 
-            def renewed(lease_s):
-                renewals.append(lease_s)
-                renew(lease_s)
+            def renewed():
+                renewals.append(None)
+                renew()
 
             async def released(self, failed=None):
                 await release(self, failed)

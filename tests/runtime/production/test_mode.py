@@ -139,9 +139,8 @@ def test_files_of_stop_and_mode_that_cannot_be_read_stop_the_station_in_manual_m
     service: Any = SimpleNamespace(
         stop=lambda: stops.append("stop"), set_mode=lambda *, production: productions.append(production)
     )
-    seen: Any = SimpleNamespace(metrics=None, audit=None)
     none: Any = None
-    orders = PlcCommands(service, none, none, none, StateFiles(tmp_path), seen)
+    orders = PlcCommands(service, none, none, none, StateFiles(tmp_path), none)
     orders.restore()
     assert bool(stops) == stopped
     assert (orders.mode, productions) == ((PRODUCTION, []) if mode is None else (MANUAL, [False]))

@@ -7,7 +7,7 @@ import pytest
 from station.channel.client import ChannelClient
 from station.channel.line import Command, CommandName, PackmlState
 from station.channel.panel import Actor
-from station.channel.panel_live import (
+from station.channel.panel_run import (
     GetPanelState,
     OperatorCommand,
     OperatorCommandName,

@@ -7,7 +7,7 @@ import pytest
 
 from station.channel.client import ChannelClient
 from station.channel.line import CommandName
-from station.channel.panel_maintenance_queries import LedsSet, SetLeds
+from station.channel.panel_maintenance import LedsSet, SetLeds
 from station.inspection.states import State
 from station.runtime.production.plc_commands import MANUAL, PRODUCTION
 from station.settings.hmi import panel_endpoint

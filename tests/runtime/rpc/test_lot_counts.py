@@ -10,7 +10,7 @@ import pytest
 
 from station.channel.client import ChannelClient
 from station.channel.line import Begin, BeginReply
-from station.channel.panel_live import FruitSummary, GetPanelState, PanelState
+from station.channel.panel_run import FruitSummary, GetPanelState, PanelState
 from station.messages import records as messages
 from station.records.database import plain, reading
 from station.records.errors import RecordsError

@@ -4,7 +4,7 @@ import asyncio
 from types import SimpleNamespace
 from typing import Any
 
-from station.channel.panel_live import FruitSummary
+from station.channel.panel_run import FruitSummary
 from station.runtime.rpc import recent_inspections
 from station.runtime.rpc.operator import PanelServer
 from station.runtime.rpc.plc import PlcInterfaceServer
@@ -29,21 +29,21 @@ def test_an_outcome_that_was_published_before_the_stations_own_is_delivered_is_s
 
 
 def test_earlier_fruit_are_restored_before_the_plc_interface_can_publish_another_outcome_of_them(bench, monkeypatch):
-    order, restore, serve = list[str](), PanelServer.restore, PlcInterfaceServer.serve
+    order, restore, make = list[str](), PanelServer.restore, PlcInterfaceServer.__init__
 
     async def restored(self):
         await restore(self)
         order.append("restored")
 
-    async def served(self):
-        order.append("served")
-        await serve(self)
+    def made(self, *arguments):
+        order.append("made")
+        make(self, *arguments)
 
     monkeypatch.setattr(PanelServer, "restore", restored)
-    monkeypatch.setattr(PlcInterfaceServer, "serve", served)
+    monkeypatch.setattr(PlcInterfaceServer, "__init__", made)
 
     async def scenario():
         async with bench():
-            assert order == ["restored", "served"]
+            assert order == ["restored", "made"]
 
     asyncio.run(scenario())

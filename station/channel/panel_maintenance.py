@@ -1,13 +1,12 @@
 """Messages of the maintenance page: health, jogging, live image, calibration, PLC registers, log."""
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 
 from station.channel.line import RegisterView
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
-from station.channel.panel_queries import Picture
 from station.messages.message import Message
 
 MOST_LINES = 500
@@ -18,8 +17,6 @@ Serial = Annotated[str, Field(max_length=64)]
 
 class GetHealth(ChannelMessage):
     """Query the state of every part, with ages."""
-
-    purpose: ClassVar[str] = "for the station's health"
 
 
 class PartHealth(ChannelMessage):
@@ -62,7 +59,6 @@ class Health(ChannelMessage):
 class JogGripper(ChannelMessage):
     """Move the fingers, slowly and with the least force; in manual mode only. Answered with `Jogged`."""
 
-    purpose: ClassVar[str] = "to jog the gripper"
     to: Literal["open", "width", "stop"]
     width_mm: float | None = Field(default=None, ge=0.0, le=85.0, allow_inf_nan=False)
     """For `to` = `width`."""
@@ -80,7 +76,6 @@ class Jogged(ChannelMessage):
 class SetLeds(ChannelMessage):
     """Set the sensor's light; in manual mode only. Answered with `LedsSet`."""
 
-    purpose: ClassVar[str] = "to set the LEDs"
     red: int = Field(ge=0, le=15)
     green: int = Field(ge=0, le=15)
     blue: int = Field(ge=0, le=15)
@@ -94,18 +89,25 @@ class LedsSet(ChannelMessage):
 class GetLiveImage(ChannelMessage):
     """Query the sensor's newest image."""
 
-    purpose: ClassVar[str] = "for a live image"
     contact: bool = False
     """Draw in what is measured against the golden reference, by the active recipe's method."""
     newer_than_s: float = Field(default=0.0, ge=0.0, allow_inf_nan=False)
     """Monotonic time of the image that the asker has."""
 
 
+class ImageFile(ChannelMessage):
+    """An image's file."""
+
+    model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
+    media_type: str
+    data: bytes
+
+
 class LiveImage(ChannelMessage):
     """An image with its time and contact."""
 
     model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
-    picture: Picture
+    picture: ImageFile
     captured_s: float
     """Monotonic."""
     age_s: float
@@ -125,8 +127,6 @@ class LiveImage(ChannelMessage):
 
 class GetCalibration(ChannelMessage):
     """Query the sensor's calibration and its last verification."""
-
-    purpose: ClassVar[str] = "for the calibration"
 
 
 class CheckView(ChannelMessage):
@@ -201,7 +201,6 @@ class CalibrationState(ChannelMessage):
 class StartCalibrationRun(ChannelMessage):
     """Calibrate or verify, in manual mode: the gripper closes on the ball. Answered with `CalibrationRunView`."""
 
-    purpose: ClassVar[str] = "to begin at the ball"
     kind: Literal["calibration", "verification"]
     places: tuple[tuple[float, float], ...] = Field(default=(), max_length=6)
     """Further places of the ball, mm beside its first; the run requests each in turn."""
@@ -211,21 +210,17 @@ class StartCalibrationRun(ChannelMessage):
 class ContinueCalibrationRun(ChannelMessage):
     """Confirm that the ball is in place. Answered with `CalibrationRunView`."""
 
-    purpose: ClassVar[str] = "to go on at the ball"
     actor: Actor
 
 
 class EndCalibrationRun(ChannelMessage):
     """Cancel the run; the jaws open. Idempotent; answered with `CalibrationRunView`."""
 
-    purpose: ClassVar[str] = "to call the run off"
     actor: Actor
 
 
 class GetRegisters(ChannelMessage):
     """Query the PLC's registers; the PLC interface sends them with its next beat."""
-
-    purpose: ClassVar[str] = "for the PLC's registers"
 
 
 class Registers(ChannelMessage):
@@ -241,7 +236,6 @@ class Registers(ChannelMessage):
 class ReadLog(ChannelMessage):
     """Read the last lines of the log."""
 
-    purpose: ClassVar[str] = "for the log"
     limit: int = Field(default=100, ge=1, le=MOST_LINES)
     level: Literal["DEBUG", "INFO", "WARNING", "ERROR"] = "INFO"
     """The least."""

@@ -1,12 +1,12 @@
-"""Orders of the operators' pages on the records: lots, and what the audit trail has of exports."""
+"""Messages of the operators' pages on lots, and on exports of a search's results."""
 
-from typing import Annotated, ClassVar
+from typing import Annotated
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
-from station.vocabulary import OutcomeName, Reason
+from station.vocabulary import LONGEST_LOT, OutcomeName, Reason
 
 Text = Annotated[str, Field(max_length=64)]
 Why = Annotated[str, Field(min_length=1, max_length=1000)]
@@ -16,7 +16,7 @@ UtcMs = Annotated[int, Field(ge=0, lt=2**63)]
 class Search(ChannelMessage):
     """Conditions on inspections: all given ones have to be met."""
 
-    lot: Annotated[str, Field(max_length=32)] | None = None
+    lot: Annotated[str, Field(max_length=LONGEST_LOT)] | None = None
     grower: Text | None = None
     fruit: Text | None = None
     """The recipe's name."""
@@ -24,14 +24,6 @@ class Search(ChannelMessage):
     to_utc_ms: UtcMs | None = None
     outcome: OutcomeName | None = None
     reason: Reason | None = None
-
-
-class Picture(ChannelMessage):
-    """A picture's file."""
-
-    model_config = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64")
-    media_type: str
-    data: bytes
 
 
 class LotView(ChannelMessage):
@@ -49,8 +41,7 @@ class LotView(ChannelMessage):
 class StartLot(ChannelMessage):
     """Begin a lot. Idempotent; answered with `LotView`."""
 
-    purpose: ClassVar[str] = "to begin a lot"
-    name: str = Field(min_length=1, max_length=32)
+    name: str = Field(min_length=1, max_length=LONGEST_LOT)
     grower: str = Field(min_length=1, max_length=64)
     actor: Actor
 
@@ -58,14 +49,12 @@ class StartLot(ChannelMessage):
 class EndLot(ChannelMessage):
     """End a lot. Idempotent; answered with `LotView`."""
 
-    purpose: ClassVar[str] = "to end a lot"
-    name: str = Field(min_length=1, max_length=32)
+    name: str = Field(min_length=1, max_length=LONGEST_LOT)
     actor: Actor
 
 
 class NoteExport(ChannelMessage):
     """An export of a search's results, for the audit trail, before it begins. Answered with `Noted`."""
 
-    purpose: ClassVar[str] = "to export inspections"
     search: Search
     actor: Actor

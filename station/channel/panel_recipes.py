@@ -1,12 +1,12 @@
 """Messages of the recipes page: a person's changes."""
 
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from pydantic import Field
 
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
-from station.channel.panel_queries import Why
+from station.channel.panel_lots import Why
 
 LARGEST_TEXT = 100_000
 """Letters of a recipe's file."""
@@ -30,7 +30,6 @@ class SaveDraft(RecipeOrder):
     Refused as a whole if the recipe would be invalid, or has changed since the author read it.
     """
 
-    purpose: ClassVar[str] = "to save a draft"
     values: dict[Annotated[str, Field(max_length=100)], Scalar | list[float]] = Field(min_length=1, max_length=200)
     """New values by their dotted paths, as `damage.area[0].area_mm2`."""
     base: str = Field(pattern=r"^[0-9a-f]{64}$")
@@ -40,27 +39,22 @@ class SaveDraft(RecipeOrder):
 class SubmitRecipe(RecipeOrder):
     """Record a recipe's file as it is as a draft."""
 
-    purpose: ClassVar[str] = "to submit a recipe"
-
 
 class ApproveRecipe(RecipeOrder):
     """Put a draft in force for the next lot; its author cannot."""
 
-    purpose: ClassVar[str] = "to approve a recipe"
     revision: Revision
 
 
 class RejectRecipe(RecipeOrder):
     """Retire a draft: it is not put in force."""
 
-    purpose: ClassVar[str] = "to reject a draft"
     revision: Revision
 
 
 class RevertRecipe(RecipeOrder):
     """Put a revision's text back into the recipe's file."""
 
-    purpose: ClassVar[str] = "to put a recipe back"
     revision: Revision | None = None
     """None for the approved one."""
 
@@ -68,7 +62,6 @@ class RevertRecipe(RecipeOrder):
 class ImportRecipe(ChannelMessage):
     """Replace a recipe's file by a whole recipe, and record it as a draft. Answered with `ImportedRecipe`."""
 
-    purpose: ClassVar[str] = "to import a recipe"
     text: str = Field(min_length=1, max_length=LARGEST_TEXT)
     reason: Why
     actor: Actor

@@ -4,7 +4,7 @@ Every command names its author and role, for the audit trail.
 """
 
 from enum import StrEnum
-from typing import ClassVar, Literal
+from typing import Literal
 
 from pydantic import Field, JsonValue
 
@@ -12,9 +12,6 @@ from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor, ListedAlarm, RecoveryName
 from station.messages.message import Message
 from station.vocabulary import OutcomeName, PackmlState
-
-LONGEST_LOT = 32
-"""As in the PLC's registers."""
 
 
 class OperatorCommandName(StrEnum):
@@ -46,7 +43,6 @@ class OperatorCommand(ChannelMessage):
     idempotent, except that a command in progress is not started twice.
     """
 
-    purpose: ClassVar[str] = "to carry out an order"
     person: Actor
     order: OperatorCommandName
     argument: str = Field(default="", max_length=64)
@@ -72,7 +68,6 @@ class OperatorCommandView(ChannelMessage):
 class PersonNoted(ChannelMessage):
     """An event of a person at the pages, for the audit trail. Answered with `line.Noted`."""
 
-    purpose: ClassVar[str] = "to note who is at the panel"
     person: Actor
     what: Literal[
         "logged_in",
@@ -96,7 +91,6 @@ class PersonNoted(ChannelMessage):
 class GetPanelState(ChannelMessage):
     """Query the operator's summary. Answered with `PanelState`."""
 
-    purpose: ClassVar[str] = "for its state"
     flooded_by: str | None = Field(default=None, max_length=64)
     """The address that floods the pages with connections; empty for none, null from who serves none."""
 
@@ -231,7 +225,6 @@ class PanelState(ChannelMessage):
 class GetRecent(ChannelMessage):
     """Query the latest fruit. Answered with `Recent`."""
 
-    purpose: ClassVar[str] = "for the last fruit"
     most: int = Field(default=20, ge=1, le=200)
 
 
@@ -244,7 +237,6 @@ class Recent(ChannelMessage):
 class GetFruit(ChannelMessage):
     """Query one of the latest fruit in full. Answered with `Fruit`; refused if it is not among the latest any more."""
 
-    purpose: ClassVar[str] = "for a fruit"
     sequence: int = Field(ge=1, lt=2**32)
 
 
@@ -285,7 +277,6 @@ class Fruit(ChannelMessage):
 class GetPicture(ChannelMessage):
     """Query a fruit's picture. Answered with `Picture`; refused if it is not stored any more."""
 
-    purpose: ClassVar[str] = "for a picture"
     sequence: int = Field(ge=1, lt=2**32)
 
 
@@ -302,8 +293,6 @@ class Picture(ChannelMessage):
 
 class GetRecipes(ChannelMessage):
     """Query the recipes to select from. Answered with `Recipes`."""
-
-    purpose: ClassVar[str] = "for the recipes"
 
 
 class Recipes(ChannelMessage):
