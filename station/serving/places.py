@@ -14,7 +14,7 @@ FLOOD_S = 60.0
 
 
 class Member(Protocol):
-    """What has a place."""
+    """Member: holder of one place."""
 
     holder: str
     """The address, or the person, that the place counts for."""

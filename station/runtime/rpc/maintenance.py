@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from station.calibration.gate import gated
 from station.channel.panel import Actor
 from station.channel.panel_maintenance import (
     HISTOGRAM_BINS,
@@ -182,7 +183,7 @@ class PanelMaintenance:
         return LedsSet()
 
     async def live_image(self, request: GetLiveImage) -> LiveImage:
-        """Return the newest image; it is measured only while nothing is inspected."""
+        """Return the newest image; its contact is measured as in an inspection, and only while nothing is inspected."""
         frame = await self._devices.cell.camera.frame(request.newer_than_s, LIVE_IMAGE_DEADLINE_S)
         active = self._service.active
         why = None
@@ -190,7 +191,9 @@ class PanelMaintenance:
             why = messages.IMAGE_BUSY()
         elif request.contact and active is None:
             why = messages.IMAGE_NO_RECIPE()
-        segmentation = active.recipe.segmentation if request.contact and active is not None and why is None else None
+        segmentation = None
+        if request.contact and active is not None and why is None:
+            segmentation = gated(active.recipe.segmentation, self._devices.calibration.gate_factor)
         return await self._worker.do(lambda: self._live(frame, segmentation, why))
 
     async def registers(self, _request: GetRegisters) -> Registers:
