@@ -13,6 +13,10 @@ from station.settings.problems import Path
 
 LARGEST_AREA_MM2 = 260.0
 """No area can be larger: the whole field, 640x480 px, at the coarsest scale published for a DIGIT, 0.0291 mm/px."""
+LARGEST_GROWTH_MM2_PER_MM = 500.0
+"""No limit of the growth may be larger. An estimate."""
+LARGEST_EXPONENT = 3.0
+"""No exponent of the area in the fruit's length may be larger. An estimate."""
 
 
 class AreaThreshold(Settings):
@@ -99,7 +103,7 @@ class SizeOfFruit(Settings):
         title="Exponent",
         description="The area of a sound fruit goes as its length over the reference length to this power.",
         gt=0.0,
-        le=3.0,
+        le=LARGEST_EXPONENT,
     )
     expected_length: LengthRange = setting(
         title="Expected length", description="A length outside is not believed: no result."
@@ -250,7 +254,7 @@ class DamageThresholds(Settings):
         "fruit of the reference size.",
         unit="mm²/mm",
         gt=0.0,
-        le=500.0,
+        le=LARGEST_GROWTH_MM2_PER_MM,
     )
     # The two below are left out of a recipe's values where they are as in recipes written before them: such a
     # recipe retains its content hash, and with it its approval.

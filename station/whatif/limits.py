@@ -17,7 +17,7 @@ from station.inspection.evidence import Evidence
 from station.inspection.judge import early_stop, judge
 from station.inspection.press import Press
 from station.inspection.sized_limits import sized_limits
-from station.settings.damage import LARGEST_AREA_MM2
+from station.settings.damage import LARGEST_AREA_MM2, LARGEST_GROWTH_MM2_PER_MM
 from station.settings.recipe_model import Recipe
 
 Values = npt.NDArray[np.float64]
@@ -25,7 +25,6 @@ Counts = npt.NDArray[np.intp]
 _Shares = TypeVar("_Shares", float, Values)
 
 CONFIDENCE = 0.95
-_LARGEST_GROWTH_MM2_PER_MM = 500.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,8 +259,8 @@ def _with_largest_limits(recipe: Recipe, closing_mm: float) -> Recipe:
         "least_area_mm2": least_area_at(recipe, closing_mm),
     }
     area = (recipe.damage.area[-1].model_copy(update=one),)
-    damage = {"area": area, "growth_mm2_per_mm": _LARGEST_GROWTH_MM2_PER_MM}
-    stop = {"area_mm2": LARGEST_AREA_MM2, "growth_mm2_per_mm": _LARGEST_GROWTH_MM2_PER_MM}
+    damage = {"area": area, "growth_mm2_per_mm": LARGEST_GROWTH_MM2_PER_MM}
+    stop = {"area_mm2": LARGEST_AREA_MM2, "growth_mm2_per_mm": LARGEST_GROWTH_MM2_PER_MM}
     return recipe.model_copy(
         update={
             "damage": recipe.damage.model_copy(update=damage),

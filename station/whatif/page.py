@@ -11,6 +11,7 @@ from markupsafe import Markup
 from sqlalchemy import Connection
 
 from station.calibration.gate import gated
+from station.calibration.gel import outlined
 from station.charts.area_chart import Curve, Limit, Size, Texts, area_chart, report_style
 from station.charts.report import data_uri, templates
 from station.inspection.press import Press
@@ -19,18 +20,19 @@ from station.recipe_store.difference import Difference
 from station.records.images import image_path
 from station.settings.recipe_model import Recipe
 from station.settings.segmentation import Segmentation
-from station.vision.contact import Contact
+from station.vision.contact import Contact, Image
 from station.vision.methods import make_method
 from station.vision.press import PressTracker
 from station.whatif.against_marks import Compared
 from station.whatif.outcome_table import AFTER, BEFORE, Counted
 from station.whatif.replay import Replayed
-from station.whatif.stored import read_gate_factor, read_stored
+from station.whatif.stored import StoredPress, read_stored
 
 MOST_SHOWN = 60
 _CHART = Size(300, 200, 12)
 _PICTURE_PX = 150
-_WHITE, _ORANGE = (255, 255, 255), (0, 140, 255)
+_ORANGE = (0, 140, 255)
+"""Blue, green, red."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +82,14 @@ def fruit_views(
     """
     stored = read_stored(connection, [result.sequence for result in results], folder, with_images=False)
     limits = {each.sequence: _limits(each.press, recipes[each.recipe_sha256], draft) for each in stored}
-    # One without limits was removed by housekeeping meanwhile.
-    return [_fruit_view(connection, folder, result, limits.get(result.sequence, []), draft) for result in results]
+    by_sequence = {each.sequence: each for each in stored}
+    # One that is not stored was removed by housekeeping meanwhile.
+    return [
+        _fruit_view(
+            connection, folder, result, by_sequence.get(result.sequence), limits.get(result.sequence, []), draft
+        )
+        for result in results
+    ]
 
 
 def _limits(press: Press, own: Recipe | None, draft: Recipe) -> list[Limit]:
@@ -95,18 +103,20 @@ def _limits(press: Press, own: Recipe | None, draft: Recipe) -> list[Limit]:
 
 
 def _fruit_view(
-    connection: Connection, folder: Path, result: Replayed, limits: Sequence[Limit], draft: Recipe
+    connection: Connection,
+    folder: Path,
+    result: Replayed,
+    stored: StoredPress | None,
+    limits: Sequence[Limit],
+    draft: Recipe,
 ) -> FruitView:
-    rows = connection.exec_driver_sql(
-        "SELECT closing_mm, area_mm2 FROM curve_points WHERE sequence = ? AND closing_mm IS NOT NULL "
-        "AND area_mm2 IS NOT NULL ORDER BY step",
-        (result.sequence,),
-    ).all()
-    curves = [Curve("own", [(row[0], row[1]) for row in rows])]
+    points = stored.press.points if stored else ()
+    curves = [Curve("own", [(point.closing_mm, point.area_mm2) for point in points])]
     if result.areas_mm2:
-        curves.append(Curve("again", [(row[0], area) for row, area in zip(rows, result.areas_mm2, strict=False)]))
+        again = zip(points, result.areas_mm2, strict=False)
+        curves.append(Curve("again", [(point.closing_mm, area) for point, area in again]))
     chart = area_chart(curves, limits, Texts(f"Area over closing of inspection {result.sequence}"), size=_CHART)
-    measuring = draft.segmentation if result.areas_mm2 else None
+    measuring = gated(draft.segmentation, stored.gate_factor) if stored and result.areas_mm2 else None
     return FruitView(result, chart, _picture(connection, folder, result.sequence, measuring))
 
 
@@ -124,43 +134,36 @@ def _picture(connection: Connection, folder: Path, sequence: int, draft: Segment
         return ""
     by_draft = None
     if draft is not None and reference is not None:
-        segmentation = gated(draft, read_gate_factor(connection, sequence))
         before = [_image(folder, sha256) for kind, of_step, sha256 in rows if kind == "step" and of_step != step]
-        by_draft = _followed(reference, [*before, image], segmentation)
+        by_draft = _followed(reference, [*before, image], draft)
     if mask is not None and mask.shape[:2] == image.shape[:2]:
-        _outline(image, mask[:, :, 0], _WHITE)
+        image = outlined(image, mask[:, :, 0])
     if by_draft is not None:
-        _outline(image, by_draft.mask, _ORANGE)
+        image = outlined(image, by_draft.mask, _ORANGE)
     scale = _PICTURE_PX / image.shape[0]
     small = cv2.resize(image, (round(scale * image.shape[1]), _PICTURE_PX), interpolation=cv2.INTER_AREA)
     data = cv2.imencode(".jpg", small, (cv2.IMWRITE_JPEG_QUALITY, 85))[1].tobytes()
     return data_uri(data)
 
 
-def _followed(
-    reference: cv2.typing.MatLike, steps: Sequence[cv2.typing.MatLike | None], segmentation: Segmentation
-) -> Contact | None:
+def _followed(reference: Image, steps: Sequence[Image | None], segmentation: Segmentation) -> Contact | None:
     """Measure the last step's contact as the last of its press; None if an image is not stored any more."""
-    tracker = PressTracker(make_method(np.asarray(reference, np.uint8), segmentation))
+    tracker = PressTracker(make_method(reference, segmentation))
     contact = None
     for image in steps:
         if image is None:
             return None
-        contact = tracker.measure_step([np.asarray(image, np.uint8)])
+        contact = tracker.measure_step([image])
     return contact
 
 
-def _outline(image: cv2.typing.MatLike, mask: cv2.typing.MatLike, colour: tuple[int, int, int]) -> None:
-    outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    cv2.drawContours(image, outlines, -1, colour, 2)
-
-
-def _image(folder: Path, sha256: str) -> cv2.typing.MatLike | None:
+def _image(folder: Path, sha256: str) -> Image | None:
     try:
         data = Path(image_path(folder, sha256)).read_bytes()
     except OSError:
         return None
-    return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    return None if image is None else np.asarray(image, np.uint8)
 
 
 def as_json(counted: Counted, against: Compared | None) -> str:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from station.records.marks import Mark
-from station.settings.damage import SizeOfFruit
+from station.settings.damage import LARGEST_EXPONENT, SizeOfFruit
 from station.settings.recipe_model import Recipe
 from station.whatif.limits import (
     Costs,
@@ -29,6 +29,8 @@ _KNOWN_SHARE = 0.9
 """Share of the good fruit that has to reach a closing; else it is not proposed: the others' areas there are unknown."""
 _SURE = 2.0
 """Standard errors by which the fruit's own exponent has to differ from the recipe's to replace it."""
+_LEAST_EXPONENT = 0.05
+"""No smaller exponent of the size is proposed: a recipe's is above 0. An estimate."""
 _CURVE_POINTS = 80
 _RATES_TO_SHOW = (0.05, 0.01)
 """False accept rates for which the report gives the number of marked fruit that would show them."""
@@ -147,7 +149,7 @@ def _at(
     found = exponent_of(fruit)
     exponent = 0.0 if rule is None else rule.exponent
     if rule is not None and found is not None and abs(found.value - exponent) > _SURE * found.standard_error:
-        exponent = round(min(max(found.value, 0.05), 3.0), 2)
+        exponent = round(min(max(found.value, _LEAST_EXPONENT), LARGEST_EXPONENT), 2)
     good, bad = at_reference(fruit, exponent, _reference_mm(rule))
     if reached < _KNOWN_SHARE * all_good or not np.isfinite(good).any() or not len(bad):
         return None

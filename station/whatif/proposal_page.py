@@ -1,42 +1,14 @@
 """Report of a proposed limit: sentences, histogram of good and bad fruit, both errors over the limit."""
 
-import io
 from collections.abc import Sequence
 from typing import Any
 
-import jinja2
 import numpy as np
 from matplotlib.figure import Figure
 
 from station.charts.area_chart import report_style
-from station.charts.report import data_uri
+from station.charts.report import data_uri, png, templates
 from station.whatif.proposal import Proposal
-
-_PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>Thresholds: {{ title }}</title>
-<style>{{ report_style }}</style></head><body><main>
-<h1>Thresholds: {{ title }}</h1>
-<div class="box">{% for line in lines %}<p>{{ line }}</p>{% endfor %}</div>
-<h2>Good and bad fruit, and the limit</h2>
-<div class="box"><img src="{{ histogram }}" alt="histogram of good and bad fruit"></div>
-<h2>Both errors over the limit</h2>
-<div class="box"><img src="{{ errors }}" alt="both errors over the limit">
-<p><label>Another limit: <input id="limit" type="range" min="0" max="{{ curve|length - 1 }}" value="{{ chosen }}"
-style="width: 60%"></label> <output id="told"></output></p></div>
-<script>
-const curve = {{ curve|tojson }}, slider = document.getElementById("limit");
-const share = (name, errors) => `${errors.count} of ${errors.of} ${name} ` +
-  `(${errors.interval.map(end => (100 * end).toFixed(1)).join(" to ")} %)`;
-const show = () => {
-  const point = curve[slider.value];
-  document.getElementById("told").textContent = `${point.limit_mm2.toFixed(1)} mm²: ` +
-    `${share("good diverted", point.good_diverted)}, ${share("bad passed", point.bad_passed)}`;
-};
-slider.addEventListener("input", show);
-show();
-</script>
-</main></body></html>
-"""
 
 
 def lines_of(figures: dict[str, Any]) -> list[str]:
@@ -70,7 +42,7 @@ def lines_of(figures: dict[str, Any]) -> list[str]:
         )
     lines.extend(f"{number} marked fruit left out: {why}" for why, number in figures["of_other_revisions"].items())
     if best["not_known"]:
-        lines.append(f"{best['not_known']} marked fruit tell nothing: a fault ended their steps")
+        lines.append(f"{best['not_known']} marked fruit are not used: a fault ended their steps")
     lines.extend(
         f"at {other['closing_mm']:g} mm: {other['limit_mm2']:.1f} mm², costs {_times(other, best)}"
         for other in figures["other_closings"]
@@ -95,11 +67,11 @@ def _times(other: dict[str, Any], best: dict[str, Any]) -> str:
 
 def page_of(title: str, best: Proposal, figures: dict[str, Any]) -> str:
     """Make the page with the figures, its two pictures and a slider on the limit, in one file."""
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
     curve = figures["proposed"]["curve"]
     chosen = min(range(len(curve)), key=lambda place: abs(curve[place]["limit_mm2"] - best.limit_mm2))
     pictures = {"histogram": _histogram(best), "errors": _errors(best, curve)}
-    return environment.from_string(_PAGE).render(
+    template = templates("station.whatif").get_template("proposal.html.j2")
+    return template.render(
         title=title, lines=lines_of(figures), curve=curve, chosen=chosen, report_style=report_style(), **pictures
     )
 
@@ -114,7 +86,7 @@ def _histogram(best: Proposal) -> str:
     axes.set_xlabel(f"least limit by which the fruit passes, at {best.closing_mm:g} mm of closing [mm²]")
     axes.set_ylabel("fruit")
     axes.legend(frameon=False)
-    return _data_uri(figure)
+    return data_uri(png(figure))
 
 
 def _errors(best: Proposal, curve: Sequence[dict[str, Any]]) -> str:
@@ -122,18 +94,12 @@ def _errors(best: Proposal, curve: Sequence[dict[str, Any]]) -> str:
     figure = Figure(figsize=(7.2, 3.0), layout="constrained")
     axes = figure.add_subplot()
     limits = [point["limit_mm2"] for point in curve]
-    for name, told, colour in (("good_diverted", "good diverted", "#5b7f95"), ("bad_passed", "bad passed", "#b3261e")):
-        axes.plot(limits, [100 * point[name]["share"] for point in curve], color=colour, label=told)
+    for name, label, colour in (("good_diverted", "good diverted", "#5b7f95"), ("bad_passed", "bad passed", "#b3261e")):
+        axes.plot(limits, [100 * point[name]["share"] for point in curve], color=colour, label=label)
         low, high = ([100 * point[name]["interval"][end] for point in curve] for end in (0, 1))
         axes.fill_between(limits, low, high, color=colour, alpha=0.15)
     axes.axvline(best.limit_mm2, color="#222222")
     axes.set_xlabel(f"limit at {best.closing_mm:g} mm of closing [mm²]")
     axes.set_ylabel("share of the fruit, with its 95 % interval [%]")
     axes.legend(frameon=False)
-    return _data_uri(figure)
-
-
-def _data_uri(figure: Figure) -> str:
-    data = io.BytesIO()
-    figure.savefig(data, format="png", dpi=110)
-    return data_uri(data.getvalue())
+    return data_uri(png(figure))

@@ -21,7 +21,9 @@ from station.whatif.replay import Replayed, measured_otherwise, recipe_of_snapsh
 from station.whatif.stored import StoredPress, read_stored
 
 CHUNK = 200
+"""Inspections of a batch without images. An estimate."""
 _WITH_IMAGES = 8
+"""Inspections of a batch with images, which take more memory and time. An estimate."""
 _AHEAD = 3
 """Batches that wait for each worker: enough that none is idle, few enough that memory stays small."""
 _ALONE_S = 2.0

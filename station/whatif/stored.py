@@ -22,6 +22,7 @@ from station.vocabulary import Flag, OutcomeName, Reason
 USUAL_ONSET_UNCERTAINTY_MM = 0.4
 """Default of the gripper's count, the step of the onset search; for records without their own."""
 _FLAGS = {flag.value for flag in Flag}
+_NO_FLAGS: frozenset[Flag] = frozenset()
 _INTERRUPTIONS = frozenset(
     {
         Reason.IMAGE_STALE,
@@ -122,12 +123,6 @@ def read_stored(connection: Connection, wanted: Sequence[int], folder: Path, *, 
     return [_stored(row, curves.get(row[0], []), images.get(row[0], ())) for row in rows]
 
 
-def read_gate_factor(connection: Connection, sequence: int) -> float:
-    """Return the factor by which the sensor's calibration had raised the robust method's gate; 1 for none."""
-    query = "SELECT json_extract(measures, '$.gate_factor') FROM inspections WHERE sequence = ?"
-    return connection.exec_driver_sql(query, (sequence,)).scalar() or 1.0
-
-
 def _stored(row: Any, curve: Iterable[Any], images: tuple[tuple[int | None, bytes], ...]) -> StoredPress:
     sequence, lot, judged, reasons, explanation, recipe_sha256, measures, length_mm_x10, size_class = row
     found = {Reason(reason) for reason in json.loads(reasons or "[]")}
@@ -162,11 +157,9 @@ def _stored(row: Any, curve: Iterable[Any], images: tuple[tuple[int | None, byte
 def _points(curve: Iterable[Any]) -> Iterator[Measured]:
     for _, closing_mm, area_mm2, area_px, confidence, flags in curve:
         if closing_mm is not None and area_mm2 is not None:
-            known = frozenset(Flag(flag) for flag in json.loads(flags) if flag in _FLAGS) if flags != "[]" else _NONE
+            given = json.loads(flags) if flags != "[]" else ()
+            known = frozenset(Flag(flag) for flag in given if flag in _FLAGS) if given else _NO_FLAGS
             yield Measured(closing_mm, area_mm2, area_px or 0, confidence, known)
-
-
-_NONE: frozenset[Flag] = frozenset()
 
 
 def _interruptions(found: set[Reason], points: Sequence[Measured], said: Sequence[Message]) -> Iterator[Reason]:
