@@ -224,7 +224,7 @@ def _line_means(strips: FloatImage, weight: FloatImage, axis: int, prior: float)
 
 
 def thinned(field: FloatImage) -> FloatImage:
-    """Every few pixels of a field, shape (height, width), about 28 along each side: enough for a median."""
+    """Every few pixels of a field, shape (height, width): 20 to 39 along a side with as many, enough for a median."""
     height, width = field.shape
     return field[:: max(1, height // _MEDIAN_SIDE), :: max(1, width // _MEDIAN_SIDE)]
 
@@ -245,7 +245,7 @@ def weighted_median(values: npt.NDArray[np.floating], weight: npt.NDArray[np.flo
 
 
 def quantile(values: npt.NDArray[np.floating], share: float) -> float:
-    """The value below which a share, 0 to 1, of all lies, of those that occur; any shape, not empty."""
+    """The largest of the values below which at most a share, 0 to 1, of the others lies; any shape, not empty."""
     return quantiles(values, share)[0]
 
 

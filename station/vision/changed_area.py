@@ -26,7 +26,7 @@ def changed(moved: Movement, noise_levels: float, constants: Constants) -> Mask:
     return (length > constants.reliable_ratio * noise_levels).astype(np.uint8)
 
 
-def agreement(contact_px: float, changed_px: float, constants: Constants) -> float:
+def area_agreement(contact_px: float, changed_px: float, constants: Constants) -> float:
     """How far a contact's area agrees with the changed area, in one unit, in size, 0 to 1.
 
     A contact whose contour takes in only a small part of what has changed is a part of a larger one, or another thing;
@@ -37,7 +37,7 @@ def agreement(contact_px: float, changed_px: float, constants: Constants) -> flo
     return float(min(1.0, constants.witness_most / share, share / constants.witness_least) ** 2)
 
 
-def agreement_of_growth(contact_px: tuple[float, float], changed_px: tuple[float, float]) -> float:
+def growth_agreement(contact_px: tuple[float, float], changed_px: tuple[float, float]) -> float:
     """How far contour and changed area, each at the last step and now, agree on a contact's shrinking, 0 to 1."""
     grown, witnessed = (float(np.log(max(now, 1.0) / max(then, 1.0))) for then, now in (contact_px, changed_px))
     return float(np.exp(-_PER_E_FOLD * max(0.0, min(0.0, witnessed) - grown)))

@@ -1,16 +1,16 @@
 """Constants of the robust method: each with its unit, its pixel grid, its meaning and its origin.
 
-Grids: `working` is the image averaged down to 320 pixels on its long side, `half` and `quarter` are that divided by two
-and four. A length in pixels of one grid is written on that grid only. Origins: `fit` was chosen by
-`./run bench fit` on the data named there; `formula` follows from the source given; `measured` was read off real
-images; `resolution` is how finely something is computed, and finer changes nothing that the fit's data show.
-`docs/robust-constants.md` has what it costs to change each.
+Grids: `working` is the image averaged down to 320 pixels on its long side, `half` is that divided by two. A length in
+pixels of one grid is written on that grid only. Origins: `fit` was chosen by `./run bench fit` on the data named there;
+`measured` was read off real images. A number that a module declares may also be a resolution: how finely something is
+computed, and finer changes nothing that the fit's data show. `docs/robust-constants.md` has what it costs to change
+each.
 """
 
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-Grid = Literal["working", "half", "quarter", ""]
+Grid = Literal["working", "half", ""]
 NORMAL_OF_MEDIAN = 1.4826
 """A normal distribution's standard deviation over its median absolute deviation."""
 
@@ -25,7 +25,7 @@ def constant(value: float, unit: str, meaning: str, origin: str, grid: Grid = ""
         value: the default.
         unit: of the value; "" for a plain ratio.
         meaning: what it does, for the table.
-        origin: `fit`, `formula: …`, `measured: …` or `resolution`.
+        origin: `fit`, `fit: …` or `measured: …`.
         grid: the pixel grid that a length in pixels belongs to.
     """
     return field(default=value, metadata={"unit": unit, "grid": grid, "meaning": meaning, "origin": origin})

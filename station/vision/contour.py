@@ -69,10 +69,6 @@ class Rays(NamedTuple):
         even = float(self.axes[0, 0] + self.axes[1, 1]) / 2  # the mean of two eigenvalues whose product is 1
         return even - math.sqrt(max(0.0, even**2 - 1))
 
-    def reach(self, mask: Mask) -> float:
-        """The radius of a circle of a region's area, in the rays' unit, at least 3."""
-        return max(3.0, float(np.sqrt(cv2.countNonZero(mask) / np.pi)))
-
     def places(self, away: _Floats, every: int = 1) -> tuple[FloatImage, FloatImage]:
         """The places at distances in the rays' unit, shape (steps,) or (rays, steps), on every ray or every n-th one.
 
@@ -132,7 +128,7 @@ def find_edge(
         rays: the region's, at that size.
         radii: how far the region reaches on them, shape (64,).
         stiffness: cost of a jump of one step between neighbouring rays, in units of a steep ray's fall.
-        constants: what is a steep fall.
+        constants: which fall counts as steep, and when a contact is mirrored.
         floor: what surely lies within the edge, 0 or not.
     """
     left, top, right, bottom = (0, 0, 0, 0) if floor is not None else _mirrored(region, constants)

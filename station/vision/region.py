@@ -21,7 +21,8 @@ from station.vision.contour import Rays, closed_path
 from station.vision.working import HALF_FROM_PX, NEXT_TO_NOTHING, SUBPIXEL_BITS, blurred, length_squared, resized
 
 CHANGE_BLUR_PX = 1.0
-"""At half the working size: the noise of single pixels goes, an achene of 1 mm stays."""
+"""At half the working size: the noise of single pixels goes, an achene of 1 mm stays. `texture.union` uses the
+same number at the working size."""
 _STEPS = 80
 """On a ray. Resolution: a fortieth of the radius."""
 _FIRST_EVERY = 2
@@ -77,7 +78,7 @@ class Region(NamedTuple):
     coherence: float
     """How far the change's directions agree within about an eighth of the radius: the median, 0 to 1."""
     textured: bool
-    """Whether achenes or drupelets turn the change's direction within a ninth of the radius."""
+    """Whether achenes or drupelets turn the change's direction within about an eighth of the radius."""
 
 
 def movement(half: FloatImage, background: Background, flat_field: FloatImage, curvature: FloatImage) -> Movement:
@@ -163,7 +164,8 @@ def find_region(
             gain[floor > 0] = 1 - share
         rays = Rays.about(inner | mask)
         every = 1 if last else _FIRST_EVERY
-        radii = _most_gained(gain, rays, p.region_span * rays.reach(inner | mask), every, p.path_stiffness)
+        # The rays' axes have the determinant 1 and keep an area: its radius in px is one in the rays' unit too.
+        radii = _most_gained(gain, rays, p.region_span * radius_of(inner | mask), every, p.path_stiffness)
         mask = _drawn(rays, radii, every, shape)
         if not mask.any():
             return None
@@ -196,7 +198,7 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
     curvature = np.sqrt(np.maximum(np.square(moved.curvature) - np.float32(halo**2), 0), dtype=np.float32)
     cap = max(quantile(curvature[region > 0], p.curved_quantile), NEXT_TO_NOTHING)
     gain = _clipped(curvature, cap) - np.float32(p.curved_share)
-    curved_radii = _most_gained(gain, rays, p.region_span * rays.reach(region), 1, p.path_stiffness)
+    curved_radii = _most_gained(gain, rays, p.region_span * radius_of(region), 1, p.path_stiffness)
     curved = _drawn(rays, curved_radii, 1, (region.shape[0], region.shape[1]))
     return (curved, curved_radii) if curved.any() else (region, radii)
 

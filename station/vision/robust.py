@@ -1,7 +1,8 @@
 """Robust method: the contact's edge under drift, streaks and weak light, as one pipeline of stages.
 
 `RobustMethod.pipeline` has the stages in their order. One `State` is passed along; each stage reads what is there and
-adds its own part. `docs/robust.md` explains each with its reasons, and has the table of what each earns.
+adds its own part. `docs/robust.md` explains each with its reasons; `docs/robust-constants.md` has what each one
+contributes.
 """
 
 from collections.abc import Callable
@@ -15,7 +16,7 @@ from station.settings.segmentation import RobustParameters
 from station.vision import pictures
 from station.vision.background import Background, BackgroundModel, Coefficients, destriped
 from station.vision.candidates import Candidates, around, body_candidates, disc, separate_candidates
-from station.vision.changed_area import agreement, agreement_of_growth, changed
+from station.vision.changed_area import area_agreement, changed, growth_agreement
 from station.vision.constants import CONSTANTS, Constants
 from station.vision.contact import Contact, FloatImage, Image, Mask, StageSink, contact_from_mask
 from station.vision.curvature import curvature, curvature_noise, first_background
@@ -30,7 +31,7 @@ from station.vision.region import (
     has_moved_widely,
     movement,
 )
-from station.vision.weak_contact import WeakContactDetector, WeakResponse
+from station.vision.weak_contact import WeakContactDetector
 from station.vision.working import (
     PRINTED_IMAGE_PX,
     PRINTED_LONG_SIDE_PX,
@@ -47,6 +48,8 @@ _WEAK_REACHES_PX, _REACHED = (18, 36, 72), 0.9
 """How far a weak contact may reach, at half the working size; the next where its region fills the one before."""
 _WEAK_DOUBT = 0.5
 """Of a weak contact's confidence: its area is rough, so that it is hardly ever judged."""
+_CLEAR_GATE = 10.0
+"""The strongest curvature over the threshold from which doubtful outlines are not checked for support. An estimate."""
 
 STAGES = (
     "reference check",
@@ -61,7 +64,7 @@ STAGES = (
     "following",
     "witness",
 )
-"""Those that can be switched off, to see what each earns."""
+"""Stages that can be left out, to measure what each one contributes."""
 
 
 class Trace(NamedTuple):
@@ -205,7 +208,7 @@ class RobustMethod:
             self._outline_candidates,
             self._drop_unsupported,
             self._find_weak_contact,
-            self._keep_floor,
+            self._flag_lost_edge,
             self._draw,
             self._keep_least,
             self._judge,
@@ -252,7 +255,7 @@ class RobustMethod:
         Raises:
             ValueError: as `measure`.
         """
-        response = self._weak_response(self._start(image, None))
+        response = self._weak.response(self._start(image, None).frame)
         return response.field, self._weak.threshold * response.compression
 
     def _start(self, image: Image, previous: Contact | None) -> State:
@@ -354,9 +357,9 @@ class RobustMethod:
     def _drop_unsupported(self, state: State) -> None:
         """Drop doubtful outlines within which no slope exceeds the noise: they are drift."""
         doubtful = [one for one in state.outlines if self._confidence(one, state) < self._parameters.least_confidence]
-        if not doubtful or state.floor is not None or state.gate >= 10 or "support" in self._without:
+        if not doubtful or state.floor is not None or state.gate >= _CLEAR_GATE or "support" in self._without:
             return
-        response = self._weak_response(state)
+        response = self._weak.response(state.frame)
         size = (response.field.shape[1], response.field.shape[0])
         places = [cv2.resize(one.inside, size, interpolation=cv2.INTER_NEAREST) for one in doubtful]
         dropped = [
@@ -370,7 +373,7 @@ class RobustMethod:
         """Search for a contact below the detection threshold where nothing was found."""
         if state.outlines or state.firm_only or "weak contact" in self._without:
             return
-        place = self._weak.place(self._weak_response(state))
+        place = self._weak.place(self._weak.response(state.frame))
         least = self._constants.weak_least_curvature * state.threshold
         if place is None or state.moved.curvature[self._weak.near(place)].max() <= least:
             return
@@ -385,8 +388,8 @@ class RobustMethod:
         if body is not None and (outline := self._outlined(state, body)) is not None:
             state.outlines.append(outline)
 
-    def _keep_floor(self, state: State) -> None:
-        """Say at least what the press so far has shown, where the edge is lost."""
+    def _flag_lost_edge(self, state: State) -> None:
+        """Flag the area as a lower bound where the edge of a followed contact is lost."""
         if state.floor is None:
             return
         sure = [self._confidence(one, state) >= self._parameters.least_confidence for one in state.outlines]
@@ -507,14 +510,11 @@ class RobustMethod:
         """How far the changed area agrees with the contact area, 0 to 1."""
         contact_px = round(contact_px * state.changed.size / (self._shape[0] * self._shape[1]))
         changed_px = cv2.countNonZero(state.changed)
-        agreed = agreement(contact_px, changed_px, self._constants)
+        agreed = area_agreement(contact_px, changed_px, self._constants)
         if state.before is not None and (before_px := cv2.countNonZero(state.before.contact)):
             kept_px = cv2.countNonZero(state.contact)
-            agreed *= agreement_of_growth((before_px, kept_px), (state.before.changed_px, changed_px))
+            agreed *= growth_agreement((before_px, kept_px), (state.before.changed_px, changed_px))
         return agreed
-
-    def _weak_response(self, state: State) -> WeakResponse:
-        return self._weak.response(state.frame)
 
     def _trace(self, state: State) -> Trace | None:
         if not cv2.countNonZero(state.mask):
@@ -550,7 +550,7 @@ class RobustMethod:
         return round(half_px * self._shape[0] * self._shape[1] / state.changed.size)
 
     def _show(self, on_stage: StageSink, state: State, difference: FloatImage) -> None:
-        response = self._weak_response(state)
+        response = self._weak.response(state.frame)
         pictures.emit(
             on_stage,
             self.stages,

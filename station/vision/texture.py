@@ -11,9 +11,10 @@ from station.vision.region import CHANGE_BLUR_PX
 _STRONG_QUANTILE = 0.8
 """Of a region's change: its strong part. At 0.9 the fit's cost is 0.008 to 0.015 higher, at 0.75 0.003 to 0.014."""
 _LEVELS_TRIED = (0.7, 1.4)
-"""Times the level: together an octave."""
+"""Factors on the level, one twice the other: how much the area changes between them gives the confidence."""
 _GROOVE_PX, _SPECK_PX, _ROOM_PX = 7, 5, 9
-"""Of the smoothing, of grooves that are bridged, of specks that are dropped, and of the room around a region."""
+"""At the working size: the widths of grooves that are bridged and of specks that are dropped, and of the room around a
+region."""
 
 
 def strength(length: FloatImage, region: Mask) -> float:
@@ -47,7 +48,7 @@ def union(length: FloatImage, region: Mask, level: float, constants: Constants) 
         length: of the change, shape (height, width), grey levels.
         region: the body's, shape of `length`, 0 or not.
         level: from `element_level`.
-        constants: how much a hanging on the level costs.
+        constants: `half_sure`, how fast the confidence falls as the area depends on the level.
 
     Returns:
         Shape of `length`, 0 or 255; and 0 to 1, the less the more the area depends on the level.
@@ -58,7 +59,7 @@ def union(length: FloatImage, region: Mask, level: float, constants: Constants) 
     smooth = cv2.GaussianBlur(length, (0, 0), CHANGE_BLUR_PX)
     near = np.asarray(cv2.dilate(region, room), np.uint8)
     pressed = (smooth > level).astype(np.uint8) & near
-    # How much of the place a level 0.7 and one 1.4 times as high leave: twice the level, so to say.
+    # Pixels above 0.7 and above 1.4 times the level.
     low, high = (1 + np.count_nonzero((smooth > factor * level) & (near > 0)) for factor in _LEVELS_TRIED)
     sure = 1 / (1 + (np.log(low / high) / constants.half_sure) ** 2)
     bridged = cv2.morphologyEx(pressed, cv2.MORPH_CLOSE, groove)

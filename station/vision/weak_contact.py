@@ -36,7 +36,7 @@ _EVERY, _BORDER_PX = 2, 8
 _LEAST_VALID, _RIM_PX = 0.5, 9
 """Where the reference is valid in less of a region it says nothing; and the rim whose slopes count as the region's."""
 _LARGE_SHARE = 0.1
-"""Of the frame."""
+"""Share of the frame from which a region is large: then its own slopes raise the compression ratio, and no codec."""
 
 
 class WeakResponse(NamedTuple):

@@ -26,7 +26,7 @@ NEXT_TO_NOTHING = 1e-3
 a sensor shows."""
 
 _SUM = np.ones((1, 3), np.float32)
-"""Of the channels."""
+"""Row of ones: `cv2.transform` by it adds up the channels."""
 
 
 def working_image(image: Image) -> Image:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from station.vision.changed_area import agreement, agreement_of_growth, changed
+from station.vision.changed_area import area_agreement, changed, growth_agreement
 from station.vision.constants import CONSTANTS
 from station.vision.region import movement
 
@@ -51,33 +51,33 @@ def test_in_weak_light_a_smaller_change_counts(moved):
 
 @given(contact=AREAS, witnessed=AREAS)
 def test_an_agreement_in_size_is_a_share(contact, witnessed):
-    assert 0 <= agreement(contact, witnessed, CONSTANTS) <= 1
+    assert 0 <= area_agreement(contact, witnessed, CONSTANTS) <= 1
 
 
 @given(contact=AREAS)
 def test_between_a_part_of_the_contact_and_its_halo_any_changed_area_agrees(contact):
     for share in (CONSTANTS.witness_least, 1.0, CONSTANTS.witness_most):
-        assert agreement(contact, max(1.0, share * contact), CONSTANTS) == pytest.approx(1)
+        assert area_agreement(contact, max(1.0, share * contact), CONSTANTS) == pytest.approx(1)
 
 
 def test_a_contour_that_takes_in_a_small_part_of_what_has_changed_disagrees():
-    assert agreement(100, 100 * 2 * CONSTANTS.witness_most, CONSTANTS) == pytest.approx(0.25)
-    assert agreement(0, 1000, CONSTANTS) < 1e-4
+    assert area_agreement(100, 100 * 2 * CONSTANTS.witness_most, CONSTANTS) == pytest.approx(0.25)
+    assert area_agreement(0, 1000, CONSTANTS) < 1e-4
 
 
 def test_a_contour_around_nothing_that_has_changed_disagrees():
-    assert agreement(10_000, 10_000 * CONSTANTS.witness_least / 2, CONSTANTS) == pytest.approx(0.25)
-    assert agreement(10_000, 0, CONSTANTS) < 1e-4
+    assert area_agreement(10_000, 10_000 * CONSTANTS.witness_least / 2, CONSTANTS) == pytest.approx(0.25)
+    assert area_agreement(10_000, 0, CONSTANTS) < 1e-4
 
 
 @given(then=AREAS, now=AREAS, changed_then=AREAS, changed_now=AREAS)
 def test_an_agreement_in_growth_is_a_share(then, now, changed_then, changed_now):
-    assert 0 <= agreement_of_growth((then, now), (changed_then, changed_now)) <= 1
+    assert 0 <= growth_agreement((then, now), (changed_then, changed_now)) <= 1
 
 
 def test_a_contour_that_has_shrunk_alone_disagrees():
     grown, both, alone, much = (
-        agreement_of_growth(contact, witness)
+        growth_agreement(contact, witness)
         for contact, witness in (
             ((100, 150), (200, 200)),
             ((100, 80), (200, 160)),

@@ -19,7 +19,7 @@ SOURCES = {
     for path in Path(folder).glob("*.py")
     if path.name != "constants.py"
 }
-ORIGINS = ("fit", "formula", "measured", "paper", "resolution")
+ORIGINS = ("fit", "measured")
 
 
 @pytest.mark.parametrize("one", fields(Constants), ids=lambda one: one.name)
@@ -27,7 +27,7 @@ def test_a_constant_states_unit_meaning_and_origin(one):
     assert set(one.metadata) == {"unit", "grid", "meaning", "origin"}
     assert one.metadata["meaning"]
     assert one.metadata["origin"].startswith(ORIGINS)
-    assert one.metadata["grid"] in {"working", "half", "quarter", ""}
+    assert one.metadata["grid"] in {"working", "half", ""}
     assert (one.metadata["unit"] == "px") == bool(one.metadata["grid"])
     assert isinstance(one.default, int | float)
 

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from station.vision.constants import CONSTANTS
 from station.vision.contour import RAYS, Rays, closed_path, find_edge
+from station.vision.region import radius_of
 
 FEW_RAYS, STEPS = 12, 9
 SHAPE = (320, 240)
@@ -55,7 +56,7 @@ def test_rays_of_a_round_region_are_a_circle():
     rays = Rays.about(ellipse(90, 150, 40, 60))
     assert rays.middle == pytest.approx((90, 150), abs=0.5)
     assert rays.axes @ rays.axes.T == pytest.approx(np.eye(2), abs=1e-6)
-    assert rays.reach(ellipse(90, 150, 40, 40)) == pytest.approx(40, rel=0.02)
+    assert radius_of(ellipse(90, 150, 40, 40)) == pytest.approx(40, rel=0.02)
 
 
 @pytest.mark.parametrize("angle_deg", [0, 40, 90])
@@ -71,7 +72,7 @@ def test_rays_of_a_long_region_are_stretched_along_it(angle_deg):
 @pytest.mark.parametrize("region", [ellipse(90, 150, 40, 40), ellipse(120, 160, 12, 96, 30)])
 def test_a_closed_line_is_the_same_on_rays_from_its_own_middle(region):
     rays = Rays.about(region)
-    radii = rays.reach(region) * (1 + 0.1 * np.cos(np.arange(RAYS) * 2 * np.pi / RAYS))
+    radii = radius_of(region) * (1 + 0.1 * np.cos(np.arange(RAYS) * 2 * np.pi / RAYS))
     moved, radii_there = rays.moved_to(rays.points(radii), SHAPE)
     masks = [
         np.asarray(cv2.fillPoly(np.zeros(SHAPE, np.uint8), [np.rint(one.points(r)).astype(np.int32)], 1)) > 0
