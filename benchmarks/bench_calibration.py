@@ -26,7 +26,7 @@ from station.settings.calibration import CalibrationSettings
 from station.settings.recipe import Recipe, find_recipe
 from station.settings.segmentation import Segmentation
 from station.studies.simulated_rig import SimulatedRig
-from station.twin.digit.sensor import Image
+from station.twin.digit.codec import Image
 from station.vision.median import median_image
 from station.vision.methods import make_method
 from station.vision.scale import TYPICAL_MM_PER_PX

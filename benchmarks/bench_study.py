@@ -22,7 +22,7 @@ import numpy as np
 from station.binomial import clopper_pearson
 from station.settings.segmentation import PaperParameters
 from station.studies import figures
-from station.studies.cohort import PAPER_FAILURES, member
+from station.studies.cohort import PAPER_FAILURES, PAPER_SAMPLES, member
 from station.studies.folder import Identity, identity_of
 from station.studies.gauge_design import TwinDesign, study_on_twin
 from station.studies.gauge_figures import components_plot, measurements_plot
@@ -41,7 +41,6 @@ DOCS = ROOT / "docs"
 COHORTS = ROOT / "state" / "study"
 SEED = 2025
 FRUITS = (Kind.STRAWBERRY, Kind.BLUEBERRY, Kind.RASPBERRY)
-PAPER_SIZE = 30
 BALL_REPEATS = 14
 
 
@@ -91,7 +90,7 @@ def failure_table(studies: dict[tuple[Kind, str], Study]) -> str:
         rows.append(
             [
                 kind,
-                percent(PAPER_FAILURES[kind], PAPER_SIZE),
+                percent(PAPER_FAILURES[kind], PAPER_SAMPLES),
                 percent(paper.failed, len(paper.samples)),
                 percent(first(robust, len(paper.samples)).failed, len(paper.samples)),
                 percent(robust.failed, len(robust.samples)),
@@ -129,7 +128,7 @@ def result_table(studies: dict[tuple[Kind, str], Study]) -> str:
     """Areas at the results' closings."""
     rows = []
     for kind in FRUITS:
-        by_method = {m: summary(first(studies[kind, m], PAPER_SIZE))["results"] for m in ("paper", "robust")}
+        by_method = {m: summary(first(studies[kind, m], PAPER_SAMPLES))["results"] for m in ("paper", "robust")}
         for ours, theirs in zip(by_method["robust"], by_method["paper"], strict=True):  # pyrefly: ignore[bad-argument-type] (lists, by their name)
             rows.append(
                 [
@@ -157,7 +156,7 @@ def size_table(studies: dict[tuple[Kind, str], Study]) -> str:
     """The cohorts' sizes, which are the paper's, and what comes of them."""
     rows = []
     for kind in FRUITS:
-        samples = first(studies[kind, "robust"], PAPER_SIZE).samples
+        samples = first(studies[kind, "robust"], PAPER_SAMPLES).samples
         sizes = np.array([(s.weight_g, s.length_mm, s.width_mm) for s in samples])
         rows.append([kind, *(f"{m:.2f} ± {d:.2f}" for m, d in zip(sizes.mean(0), sizes.std(0, ddof=1), strict=True))])
     return table(["", "weight, g", "length, mm", "width, mm"], rows)
@@ -296,7 +295,7 @@ def draw(studies: dict[tuple[Kind, str], Study]) -> dict[str, str]:
     folder.mkdir(exist_ok=True)
     stages: list[list[str]] = []
     for kind in (*FRUITS, Kind.RUBBER_BALL):
-        pair = [first(studies[kind, method], PAPER_SIZE) for method in ("paper", "robust")]
+        pair = [first(studies[kind, method], PAPER_SAMPLES) for method in ("paper", "robust")]
         widths = [sample.width_mm for sample in pair[0].samples]
         number = pair[0].samples[np.argsort(widths)[len(widths) // 2]].number
         (folder / f"{kind}-curves.png").write_bytes(figures.cohort_curves(pair))
@@ -373,7 +372,7 @@ def main() -> None:
     studies: dict[tuple[Kind, str], Study] = {}
     for method in [arguments.only] if arguments.only else ["robust", "paper"]:
         for kind in FRUITS:
-            studies[kind, method] = cohort(kind, method, PAPER_SIZE if method == "paper" else arguments.samples)
+            studies[kind, method] = cohort(kind, method, PAPER_SAMPLES if method == "paper" else arguments.samples)
         studies[Kind.RUBBER_BALL, method] = cohort(Kind.RUBBER_BALL, method, BALL_REPEATS)
     if arguments.only:
         return

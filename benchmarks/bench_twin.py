@@ -38,9 +38,10 @@ from station.memory import keep_freed_memory
 from station.settings.camera import CameraSettings, TwinCameraSettings
 from station.settings.segmentation import PaperParameters
 from station.twin.clock import SteadyClock
+from station.twin.digit.codec import Image
 from station.twin.digit.optics import Optics
 from station.twin.digit.press import PressOptions, render_press
-from station.twin.digit.sensor import DigitSensor, Image
+from station.twin.digit.sensor import DigitSensor
 from station.twin.digit.server import DigitCameraServer, digit_faults
 from station.twin.digit.spoil import FRAME_FAULTS, spoiled
 from station.twin.fruit import Kind, draw_fruit

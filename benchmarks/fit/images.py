@@ -17,7 +17,7 @@ from measurement.light_touch import DETECTION_PLACES, DETECTION_UNITS, light_clo
 from measurement.soft_bodies import moved_specks, with_jpeg, with_video
 from measurement.untouched import CONDITIONS
 
-from station.twin.contact import Pose
+from station.twin.contact import MIDDLE_X_PX, MIDDLE_Y_PX, Pose
 from station.twin.digit.press import PressOptions
 from station.twin.digit.sensor import DigitSensor
 from station.twin.fruit import Kind, draw_fruit
@@ -167,7 +167,7 @@ def large_balls(seed: int, units: int = 8) -> list[PressData]:
     for number, (across_mm, unit) in enumerate(product(LARGE_BALLS_MM, range(seed, seed + units))):
         x_px, y_px = np.random.default_rng(seed + number).normal(0.0, OFF_CENTRE_PX, 2)
         ball = replace(draw_fruit(Kind.RUBBER_BALL, 0), width_mm=across_mm, length_mm=across_mm)
-        options = PressOptions(pose=Pose(240.0 + x_px, 320.0 + y_px), unit=unit)
+        options = PressOptions(pose=Pose(MIDDLE_X_PX + x_px, MIDDLE_Y_PX + y_px), unit=unit)
         press = on_the_twin.squeezed_with_masks(ball, seed + number, options, LARGE_CLOSINGS_MM)
         found.append(PressData(f"ball of {across_mm:g} mm", *press))
     return found

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from station.twin.contact import Mask, Pose
-from station.twin.digit.codec import as_jpeg
+from station.twin.digit.codec import Image, as_jpeg
 from station.twin.digit.loaded import band_share
-from station.twin.digit.sensor import Condition, DigitSensor, Image
+from station.twin.digit.sensor import Condition, DigitSensor
 from station.twin.gel import MM_PER_PX, SENSOR_SHAPE
 
 from .soft.body import SoftKind, draw_soft_body

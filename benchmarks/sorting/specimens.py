@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from station.studies.cohort import PLACE_PX, TILT_DEG, TURN_DEG
 from station.studies.gauge_grip import CALIBRATION_SD
-from station.twin.contact import Pose
+from station.twin.contact import MIDDLE_X_PX, MIDDLE_Y_PX, Pose
 from station.twin.damage import DAMAGES, Severity
 from station.twin.fruit import Fruit, Kind, draw_fruit
 
@@ -23,8 +24,7 @@ UNITS = 20
 
 _ZERO_SD_MM = 0.2
 _HABIT_PX, _HABIT_DEG = 10.0, 3.0
-_PLACE_PX, _TURN_DEG, _TILT_DEG = 19.0, 5.0, 2.0
-"""As the gauge study draws an operator's set-up and how a fruit is laid in; here both anew for each fruit."""
+"""As the gauge study draws an operator's set-up; here it is drawn anew for each fruit, as how the fruit is laid in."""
 _SCALES_MM_PER_PX = (0.0255, 0.0291)
 """What is published for single DIGIT units."""
 _GRADER_MM = 1.0
@@ -96,14 +96,14 @@ def draw(task: Task) -> Specimen:
     fruit = draw_fruit(task.kind, fruit_seed)
     if task.group != SOUND:
         fruit = replace(fruit, bruised=True, damage=DAMAGES[Severity(task.group)])
-    shift_px = generator.normal(0.0, _HABIT_PX, 2) + generator.normal(0.0, _PLACE_PX, 2)
-    turn_deg = generator.normal(0.0, _HABIT_DEG) + generator.normal(0.0, _TURN_DEG)
+    shift_px = generator.normal(0.0, _HABIT_PX, 2) + generator.normal(0.0, PLACE_PX, 2)
+    turn_deg = generator.normal(0.0, _HABIT_DEG) + generator.normal(0.0, TURN_DEG)
     mm_per_px = float(generator.uniform(*_SCALES_MM_PER_PX))
     if task.seeds == ON_UNITS:
         unit, mm_per_px = sensor_unit(task.number)
     return Specimen(
         fruit=fruit,
-        pose=Pose(240.0 + shift_px[0], 320.0 + shift_px[1], turn_deg, generator.normal(0.0, _TILT_DEG)),
+        pose=Pose(MIDDLE_X_PX + shift_px[0], MIDDLE_Y_PX + shift_px[1], turn_deg, generator.normal(0.0, TILT_DEG)),
         unit=unit,
         mm_per_px=mm_per_px,
         calibrated_mm_per_px=mm_per_px * (1.0 + float(generator.normal(0.0, CALIBRATION_SD))),

@@ -19,7 +19,7 @@ from station.errors import BadInputError
 from station.twin.digit import numbers
 from station.twin.digit.backgrounds import COSINES, FLOOR, cosine_basis
 from station.twin.digit.noise import Drift, FrameNoise
-from station.twin.digit.numbers import FILE, Array, NoiseLevels
+from station.twin.digit.numbers import FILE, NoiseLevels
 from station.twin.digit.optics import DIRECTIONS, PLACES, SLOPE_KNOTS, grid_places, slope_basis, slopes
 from station.twin.gel import (
     GRID_SHAPE,
@@ -147,7 +147,7 @@ def fit_table(reference: npt.NDArray[np.uint8], presses: Sequence[Press]) -> Flo
     return weights.reshape(rings, DIRECTIONS, PLACES, 3).astype(np.float32)
 
 
-def fit_backgrounds(images: Sequence[npt.NDArray[np.uint8]]) -> tuple[Array, Array, Array]:
+def fit_backgrounds(images: Sequence[npt.NDArray[np.uint8]]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The mean, the principal variations and each image's part in them, in cosine coefficients of the logarithm.
 
     Args:
@@ -166,7 +166,7 @@ def fit_backgrounds(images: Sequence[npt.NDArray[np.uint8]]) -> tuple[Array, Arr
     return mean, (modes[:_MODES] * scale[:, None]).reshape(_MODES, *mean.shape), weights
 
 
-def _cosines(image: npt.NDArray[np.uint8]) -> Array:
+def _cosines(image: npt.NDArray[np.uint8]) -> FloatArray:
     logarithm = np.log(cv2.GaussianBlur(image, (0, 0), image.shape[1] / 120).astype(np.float32) + FLOOR)
     rows, columns = image.shape[:2]
     down, along = cosine_basis(rows, COSINES[0]) / rows, cosine_basis(columns, COSINES[1]) / columns

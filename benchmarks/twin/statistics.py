@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from station.twin.digit.numbers import Array
+from station.twin.gel import FloatArray
 
 _FINE_PX = 15.0
 
@@ -16,17 +16,17 @@ _FINE_PX = 15.0
 class NoiseStatistics:
     """Grey levels of the change from one frame to the next, outside the contacts; each of shape (3,), B, G, R."""
 
-    pixel: Array
+    pixel: FloatArray
     """Standard deviation of a pixel in one frame: the change's over the root of two."""
-    column: Array
+    column: FloatArray
     """Standard deviation of the columns' means."""
-    column_fine: Array
+    column_fine: FloatArray
     """The same without what is wider than about 30 px."""
-    row: Array
-    row_fine: Array
-    offset_median: Array
+    row: FloatArray
+    row_fine: FloatArray
+    offset_median: FloatArray
     """Median size of the whole frame's change."""
-    offset_p95: Array
+    offset_p95: FloatArray
 
 
 def measure_noise(frames: Sequence[npt.NDArray[np.uint8]], outside: Sequence[npt.NDArray[np.bool_]]) -> NoiseStatistics:
@@ -36,8 +36,8 @@ def measure_noise(frames: Sequence[npt.NDArray[np.uint8]], outside: Sequence[npt
         frames: each of shape (rows, columns, 3), dtype uint8, at least two.
         outside: for each frame where nothing touches, shape (rows, columns).
     """
-    found: list[Array] = []
-    offsets: list[Array] = []
+    found: list[FloatArray] = []
+    offsets: list[FloatArray] = []
     for before, after, free_before, free_after in zip(frames, frames[1:], outside, outside[1:], strict=False):
         free = (free_before & free_after)[..., None].astype(np.float32)
         change = (after.astype(np.float32) - before) * free
@@ -54,7 +54,7 @@ def measure_noise(frames: Sequence[npt.NDArray[np.uint8]], outside: Sequence[npt
     return NoiseStatistics(pixel, column, column_fine, row, row_fine, median, p95)
 
 
-def _fine(line: Array) -> Array:
+def _fine(line: FloatArray) -> FloatArray:
     """Standard deviation of a line's means without its slow part, per channel."""
     slow = cv2.GaussianBlur(line[None], (0, 0), _FINE_PX, sigmaY=1e-3)[0]
     return (line - slow).std(axis=0)

@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from station.twin.contact import Pose
+from station.twin.contact import MIDDLE_X_PX, MIDDLE_Y_PX, Pose
 from station.twin.digit.press import PressOptions, PressSequence, render_press
 from station.twin.fruit import Fruit, Kind, draw_fruit
 
@@ -22,16 +22,21 @@ RESULT_CLOSINGS_MM: dict[Kind, tuple[float, ...]] = {
 }
 """Closings of the paper's results; the ball's are its widths from 41 to 35 mm, with the first contact at 42."""
 PAPER_FAILURES: dict[Kind, int] = {Kind.STRAWBERRY: 6, Kind.BLUEBERRY: 8, Kind.RASPBERRY: 18}
-"""Of 30 each: 20.0, 26.7 and 60.0 %, called pronounced fluctuations of the area over closing."""
+"""Of `PAPER_SAMPLES` each: 20.0, 26.7 and 60.0 %, called pronounced fluctuations of the area over closing."""
+PAPER_SAMPLES = 30
+"""Fruit of each kind in the paper."""
 FRUITS = tuple(str(kind) for kind in RESULT_CLOSINGS_MM)
 
 STEP_MM = 1.0
+"""Closing from one image to the next: of the ball the paper's, of fruit ours."""
 _IMAGES, _BALL_IMAGES = 20, 14
+"""Images of a fruit's press, so that they begin before its first contact, and of the ball's, the paper's."""
 _BALL_FROM_MM = -4.0
 """The ball's images run from 46 to 33 mm of width, and 42 mm is the first contact."""
 _STEP_S = 1.0
-_PLACE_PX, _TURN_DEG, _TILT_DEG = 19.0, 5.0, 2.0
-"""Standard deviations of how a fruit is laid in by hand: half a millimetre and a few degrees. Our estimate."""
+"""Time from one image to the next. An estimate."""
+PLACE_PX, TURN_DEG, TILT_DEG = 19.0, 5.0, 2.0
+"""Standard deviations of how a fruit is laid in by hand: half a millimetre and a few degrees. An estimate."""
 _KIND_CODES = {kind: number for number, kind in enumerate(RESULT_CLOSINGS_MM)}
 
 
@@ -64,9 +69,9 @@ def member(kind: Kind | str, seed: int, number: int) -> Member:
     generator = np.random.default_rng([seed, _KIND_CODES[kind], number])
     fruit_seed, noise_seed = (int(one) for one in generator.integers(2**31, size=2))
     fruit = draw_fruit(kind, fruit_seed)
-    x_px, y_px = generator.normal(0.0, _PLACE_PX, 2)
-    turn_deg, tilt_deg = generator.normal(0.0, (_TURN_DEG, _TILT_DEG))
-    pose = Pose(240.0 + x_px, 320.0 + y_px, turn_deg, tilt_deg)
+    x_px, y_px = generator.normal(0.0, PLACE_PX, 2)
+    turn_deg, tilt_deg = generator.normal(0.0, (TURN_DEG, TILT_DEG))
+    pose = Pose(MIDDLE_X_PX + x_px, MIDDLE_Y_PX + y_px, turn_deg, tilt_deg)
     phase_mm = float(generator.uniform(-0.5, 0.5)) * STEP_MM
     if kind == Kind.RUBBER_BALL:
         closings = _BALL_FROM_MM + STEP_MM * np.arange(_BALL_IMAGES)

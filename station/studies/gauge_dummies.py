@@ -16,17 +16,20 @@ from station.settings.recipe import find_recipe
 from station.studies.gauge_grip import FruitRig, Grip, true_area_mm2
 from station.studies.gauge_table import Measurement
 from station.studies.gauge_twin import GaugeTask, Simulated, setup_of
-from station.twin.contact import Pose
+from station.twin.contact import MIDDLE_X_PX, MIDDLE_Y_PX, Pose
 from station.twin.fruit import Fruit, Kind, draw_fruit
 from station.twin.gel import MM_PER_PX
 
 SMALLEST_MM, LARGEST_MM = 20.0, 38.0
+"""Diameters of the smallest and the largest ball, so that their areas reach from below a sound fruit's to the limit."""
 PLAY_MM, STOP_MM = 0.05, 0.02
-"""Standard deviations of the ball's place in the jig and of the width at the stop; our estimates."""
+"""Standard deviations of the ball's place in the jig and of the width at the stop. Estimates."""
 DUMMY_TRUTHS = ("Jig and stop: true areas at the width as it was",)
 """Causes of variation of the true areas."""
 _MOST_READINGS = 5
+"""Readings of one measurement, of which the last is accepted in any case. An estimate."""
 _CLOSINGS_MM = np.arange(0.5, 10.0, 0.5)
+"""Closings at which the largest ball's area is computed, to interpolate the stop's. A resolution."""
 
 
 def ball_of(task: GaugeTask, parts: int) -> Fruit:
@@ -66,7 +69,7 @@ def measure_dummy(task: GaugeTask, parts: int) -> Simulated:
     while True:
         x_px, y_px = generator.normal(0.0, PLAY_MM / MM_PER_PX, 2)
         closing_mm = stop_mm(task.fruit) + float(generator.normal(0.0, STOP_MM))
-        pose = Pose(240.0 + x_px, 320.0 + y_px)
+        pose = Pose(MIDDLE_X_PX + x_px, MIDDLE_Y_PX + y_px)
         contact = Grip(recipe, FruitRig(ball, pose, unit, int(generator.integers(2**31)))).held(closing_mm)
         if not contact.flags or refused == _MOST_READINGS - 1:
             break

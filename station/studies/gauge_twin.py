@@ -13,17 +13,15 @@ import numpy as np
 
 from station.inspection.judge import judge
 from station.settings.recipe import find_recipe
-from station.studies.cohort import member
+from station.studies.cohort import PAPER_SAMPLES, PLACE_PX, TILT_DEG, TURN_DEG, member
 from station.studies.gauge_grip import FruitRig, Grip, last_limit_mm, true_area_mm2
 from station.studies.gauge_table import Measurement
-from station.twin.contact import Pose
+from station.twin.contact import MIDDLE_X_PX, MIDDLE_Y_PX, Pose
 from station.twin.fruit import Fruit
 
 _ZERO_SD_MM = 0.2
 _HABIT_PX, _HABIT_DEG = 10.0, 3.0
-_PLACE_PX, _TURN_DEG, _TILT_DEG = 19.0, 5.0, 2.0
-"""Standard deviations of an operator's gripper zero and habit, and of laying a fruit in; our estimates."""
-_TOLERANCE_FRUIT = 30
+"""Standard deviations of an operator's gripper zero and habit. Estimates."""
 
 PART_TRUTHS = (
     "Fruit placed again: true areas at the true closing",
@@ -80,7 +78,7 @@ def setup_of(task: GaugeTask) -> Setup:
     turn_deg = float(generator.normal(0.0, _HABIT_DEG))
     zero_mm = float(generator.normal(0.0, _ZERO_SD_MM))
     unit = int(generator.integers(2**31)) if task.operator else None
-    return Setup(unit, zero_mm, Pose(240.0 + x_px, 320.0 + y_px, turn_deg))
+    return Setup(unit, zero_mm, Pose(MIDDLE_X_PX + x_px, MIDDLE_Y_PX + y_px, turn_deg))
 
 
 def pose_of(task: GaugeTask) -> Pose:
@@ -88,10 +86,10 @@ def pose_of(task: GaugeTask) -> Pose:
     habit = setup_of(task).habit
     generator = np.random.default_rng([task.seed, 102, task.part, task.operator])
     return Pose(
-        habit.x_px + generator.normal(0.0, _PLACE_PX),
-        habit.y_px + generator.normal(0.0, _PLACE_PX),
-        habit.turn_deg + generator.normal(0.0, _TURN_DEG),
-        generator.normal(0.0, _TILT_DEG),
+        habit.x_px + generator.normal(0.0, PLACE_PX),
+        habit.y_px + generator.normal(0.0, PLACE_PX),
+        habit.turn_deg + generator.normal(0.0, TURN_DEG),
+        generator.normal(0.0, TILT_DEG),
     )
 
 
@@ -130,7 +128,7 @@ def good_and_damaged_mm2(fruit: str, seed: int) -> tuple[float, float]:
     closing_mm = last_limit_mm(find_recipe(fruit))
 
     def mean(*, bruised: bool) -> float:
-        members = [member(fruit, seed, number) for number in range(_TOLERANCE_FRUIT)]
+        members = [member(fruit, seed, number) for number in range(PAPER_SAMPLES)]
         areas = [true_area_mm2(replace(one.fruit, bruised=bruised), one.pose, closing_mm) for one in members]
         return float(np.mean(areas))
 

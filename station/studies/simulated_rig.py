@@ -8,15 +8,18 @@ from station.calibration.rig import Place
 from station.inspection.press import FINEST_STEP_MM
 from station.messages.message import Message
 from station.press.rig import Position
+from station.settings.calibration import CalibrationSettings
 from station.settings.gripper import GripperCalibration
-from station.twin.contact import FruitOnGel, Pose
-from station.twin.digit.sensor import Condition, DigitSensor, Image
+from station.twin.contact import MIDDLE_X_PX, MIDDLE_Y_PX, FruitOnGel, Pose
+from station.twin.digit.codec import Image
+from station.twin.digit.sensor import Condition, DigitSensor
 from station.twin.fruit import Kind, draw_fruit
 from station.twin.gel import MM_PER_PX, Gel
 from station.twin.squeeze import Squeeze
 
-_HOLDER_MM = 18.0
+_HOLDER_MM = CalibrationSettings().holder_mm
 _FRAME_S, _STEP_S = 1 / 30, 1.3
+"""Time of a frame at 30 a second, and of one width step. An estimate."""
 _GRIPPER = GripperCalibration()
 
 
@@ -114,7 +117,7 @@ class SimulatedRig(StationaryRig):
         self.places.append(place)
         x_mm, y_mm = (mm + self._spill_mm * self._spill.standard_normal() for mm in place)
         scale = self._gel.mm_per_px
-        self._contact = FruitOnGel(self._fruit, Pose(240 + x_mm / scale, 320 + y_mm / scale), self._gel)
+        self._contact = FruitOnGel(self._fruit, Pose(MIDDLE_X_PX + x_mm / scale, MIDDLE_Y_PX + y_mm / scale), self._gel)
 
     async def release(self, failed: Message | None = None) -> None:
         """Open the jaws."""

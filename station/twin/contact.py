@@ -20,6 +20,8 @@ from station.twin.squeeze import Squeezed
 
 Mask = npt.NDArray[np.uint8]
 
+MIDDLE_X_PX, MIDDLE_Y_PX = SENSOR_SHAPE[1] / 2, SENSOR_SHAPE[0] / 2
+"""Middle of the sensor's image."""
 _SKIN_MM, _BRIDGE_MM, _LEVELLED_MM = 0.1, 0.25, 2.0
 """Smoothing of the texture: in the imprint, in the outline, and what counts as its mean level."""
 _BRIDGED = 0.3
@@ -32,8 +34,8 @@ _FULL_IMPRINT_PRESSURE = 0.4
 class Pose:
     """Where and how the fruit meets the gel."""
 
-    x_px: float = 240.0
-    y_px: float = 320.0
+    x_px: float = MIDDLE_X_PX
+    y_px: float = MIDDLE_Y_PX
     turn_deg: float = 0.0
     tilt_deg: float = 0.0
     """Lean of the fruit's surface against the gel, about the image's rows."""

@@ -25,7 +25,7 @@ class CommonFault(StrEnum):
 
 
 class FaultBoard:
-    """One device's switches. The device asks; tests, the console and the command line set."""
+    """Switches of one device's faults: the device reads them; tests, the console and the command line set them."""
 
     def __init__(self, device: str, own: tuple[str, ...] = ()) -> None:
         self.device = device

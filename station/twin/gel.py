@@ -66,8 +66,8 @@ def half_space_surface(ratio_squared: FloatArray) -> FloatArray:
     Johnson's equation 3.42a; at the edge it has the value 1/2 and the slope of the paraboloid.
     """
     angle = np.arcsin(1.0 / np.sqrt(ratio_squared))
-    skirt = ((2.0 - ratio_squared) * angle + np.sqrt(ratio_squared - 1.0)) / np.float32(np.pi)
-    return skirt.astype(np.float32)
+    halo = ((2.0 - ratio_squared) * angle + np.sqrt(ratio_squared - 1.0)) / np.float32(np.pi)
+    return halo.astype(np.float32)
 
 
 def visible_edge_mm(contact_radius_mm: float, edge_slope: float) -> float:
@@ -112,7 +112,7 @@ def dent_mm(gap_mm: FloatArray, approach_mm: float, surface: Surface, gel: Gel) 
     """The gel's dent under a rigid body whose surface is `gap_mm` behind its foremost point.
 
     The contact's edge lies where the gap is half the approach: for a paraboloid that is Hertz's a² = R·δ.
-    Inside the gel takes the body's shape; outside it follows Hertz's skirt over the distance from the edge.
+    Inside the gel takes the body's shape; outside it follows Hertz's halo over the distance from the edge.
 
     Args:
         gap_mm: shape (rows, columns), not negative, 0 at the foremost point.
@@ -128,5 +128,5 @@ def dent_mm(gap_mm: FloatArray, approach_mm: float, surface: Surface, gel: Gel) 
     outwards_squared = np.maximum(surface.relative_squared(gap_mm) / at_edge, np.float32(1.0))
     contact_radius_mm = np.float32(np.sqrt(approach_mm * surface.radius_mm))
     beyond_mm = (np.sqrt(outwards_squared) - 1.0) * contact_radius_mm
-    skirt = np.float32(approach_mm) * half_space_surface(outwards_squared) * gel.outer_share(beyond_mm)
-    return np.where(gap_mm < approach_mm / 2, approach_mm - gap_mm, skirt).astype(np.float32)
+    halo = np.float32(approach_mm) * half_space_surface(outwards_squared) * gel.outer_share(beyond_mm)
+    return np.where(gap_mm < approach_mm / 2, approach_mm - gap_mm, halo).astype(np.float32)

@@ -21,7 +21,7 @@ from station.twin.can.faults import line_faults
 from station.twin.can.line import LineNodes
 from station.twin.clock import Clock, SteadyClock
 from station.twin.console import Action, ConsoleServer
-from station.twin.contact import Pose
+from station.twin.contact import MIDDLE_X_PX, MIDDLE_Y_PX, Pose
 from station.twin.damage import DAMAGES, Severity
 from station.twin.digit.sensor import DigitSensor
 from station.twin.digit.server import DigitCameraServer, digit_faults
@@ -162,7 +162,9 @@ class Twin:
         places = [request.get(axis, 0.0) for axis in ("x_mm", "y_mm")]
         if not all(isinstance(mm, int | float) and abs(mm) <= _FURTHEST_MM for mm in places):
             raise ValueError(f"x_mm, y_mm: expected numbers from -{_FURTHEST_MM:g} to {_FURTHEST_MM:g}, found {places}")
-        x_px, y_px = (middle + mm / self._mm_per_px for middle, mm in zip((240.0, 320.0), places, strict=True))
+        x_px, y_px = (
+            middle + mm / self._mm_per_px for middle, mm in zip((MIDDLE_X_PX, MIDDLE_Y_PX), places, strict=True)
+        )
         fruit = draw_fruit(Kind(kind), seed, bruised=bruised, damage=DAMAGES[Severity(severity)])
         holder_mm = _BALL_HOLDER_MM if kind == Kind.RUBBER_BALL else 0.0
         self.world.place(fruit, Pose(x_px, y_px), holder_mm)

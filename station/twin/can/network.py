@@ -37,7 +37,7 @@ class LoopNetwork(canopen.Network):
     """canopen's network with its callbacks on the loop."""
 
     def __init__(self, settings: CanSettings, silent: Callable[[], bool]) -> None:
-        """Prepare; nothing is opened. While `silent` says so, nothing is sent or heard."""
+        """Prepare; nothing is opened. While `silent` returns True, nothing is sent or received."""
         super().__init__()
         self._settings, self._silent = settings, silent
 

@@ -7,8 +7,8 @@ coefficients. Dust and fixed column streaks, which no unit lacks, are drawn on t
 import cv2
 import numpy as np
 
-from station.twin.digit.numbers import Array, Fitted
-from station.twin.gel import SENSOR_SHAPE
+from station.twin.digit.numbers import Fitted
+from station.twin.gel import SENSOR_SHAPE, FloatArray
 
 COSINES = (16, 12)
 """Coefficients down the rows and along the columns."""
@@ -19,7 +19,7 @@ _STREAKS = 1.0
 _DUST = 6
 
 
-def cosine_basis(length: int, count: int) -> Array:
+def cosine_basis(length: int, count: int) -> FloatArray:
     """The first `count` cosines of the orthonormal DCT-II at a length in samples.
 
     Returns:
@@ -30,7 +30,7 @@ def cosine_basis(length: int, count: int) -> Array:
     return (np.cos(np.pi * place[:, None] * np.arange(count)) * scale).astype(np.float32)
 
 
-def cosine_field(coefficients: Array, shape: tuple[int, int] = SENSOR_SHAPE) -> Array:
+def cosine_field(coefficients: FloatArray, shape: tuple[int, int] = SENSOR_SHAPE) -> FloatArray:
     """Draw a field of a shape (rows, columns) from its cosine coefficients, shape (3, rows, columns).
 
     Returns:
@@ -41,7 +41,7 @@ def cosine_field(coefficients: Array, shape: tuple[int, int] = SENSOR_SHAPE) -> 
     return np.stack([down @ channel @ along.T for channel in coefficients], axis=-1)
 
 
-def background(fitted: Fitted, unit: int | None) -> Array:
+def background(fitted: Fitted, unit: int | None) -> FloatArray:
     """The clean no-contact image of a unit, by its seed; None for the unit that the optical table was fitted on.
 
     Returns:
@@ -59,7 +59,7 @@ def background(fitted: Fitted, unit: int | None) -> Array:
     return np.clip(image, 0.0, 250.0).astype(np.float32)
 
 
-def _scatter_dust(image: Array, generator: np.random.Generator) -> None:
+def _scatter_dust(image: FloatArray, generator: np.random.Generator) -> None:
     """Darken a few small specks, blurred as by dust under the gel."""
     rows, columns = SENSOR_SHAPE
     shade = np.zeros(SENSOR_SHAPE, np.float32)

@@ -10,7 +10,6 @@ unit's seed.
 import cv2
 import numpy as np
 
-from station.twin.digit.numbers import Array
 from station.twin.gel import GRID_STEP, MM_PER_PX, SENSOR_SHAPE, FloatArray
 
 _COARSE = 4
@@ -43,7 +42,7 @@ class LoadedLight:
         self._bands = _bands(generator)
         self._shade = _shade(generator)
 
-    def bands(self, dent: FloatArray, levels: float) -> Array:
+    def bands(self, dent: FloatArray, levels: float) -> FloatArray:
         """The bands' change in grey levels, shape (640, 480, 3).
 
         Args:
@@ -52,7 +51,7 @@ class LoadedLight:
         """
         return self._bands * np.float32(levels * band_share(float(dent.mean())))
 
-    def shade(self, dent: FloatArray, levels_per_mm: float) -> Array:
+    def shade(self, dent: FloatArray, levels_per_mm: float) -> FloatArray:
         """The change in grey levels of a dent by its depth alone, shape (640, 480, 3).
 
         Args:
@@ -70,7 +69,7 @@ def band_share(push_mm: float) -> float:
     return float(-np.expm1(-((max(0.0, push_mm) / _PUSH_MM) ** _PUSH_POWER)))
 
 
-def _bands(generator: np.random.Generator) -> Array:
+def _bands(generator: np.random.Generator) -> FloatArray:
     """The bands at their brightest, the largest value 1; shape (640, 480, 3)."""
     height, width = (side // _COARSE for side in SENSOR_SHAPE)
     total = np.zeros((height, width, 3), np.float32)
@@ -95,7 +94,7 @@ def _bands(generator: np.random.Generator) -> Array:
     return np.asarray(fine, np.float32)
 
 
-def _shade(generator: np.random.Generator) -> Array:
+def _shade(generator: np.random.Generator) -> FloatArray:
     """The shade of a dent of one millimetre over its strongest colour's, tilted over the image; (640, 480, 3)."""
     colours = generator.uniform(*_SHADES, 3)
     colours /= np.abs(colours).max()

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 
 from station.twin.digit.backgrounds import cosine_field
-from station.twin.digit.numbers import Array, NoiseLevels
-from station.twin.gel import SENSOR_SHAPE
+from station.twin.digit.numbers import NoiseLevels
+from station.twin.gel import SENSOR_SHAPE, FloatArray
 
 _BANKS = 6
 _BANK_MARGIN = 48
@@ -34,12 +34,12 @@ DRIFT_STEP_S = 0.2
 
 
 @lru_cache(maxsize=1)  # of the sensor made last: who makes it again, as tests and benchmarks do, waits for no draw
-def _banks(levels: tuple[float, ...], seed: int) -> tuple[list[Array], Mapping[str, Any]]:
+def _banks(levels: tuple[float, ...], seed: int) -> tuple[list[FloatArray], Mapping[str, Any]]:
     """Fields of pixel noise, and the state of the generator that has drawn them."""
     generator = np.random.default_rng([seed, 3])
     rows, columns = (side + _BANK_MARGIN for side in SENSOR_SHAPE)
     mix = np.linalg.cholesky(_CHANNELS)
-    banks: list[Array] = []
+    banks: list[FloatArray] = []
     for _ in range(_BANKS):
         # By OpenCV: numpy takes four times as long for sums and products along pixels of three channels.
         white = cv2.transform(generator.standard_normal((rows, columns, 3), np.float32), mix)
@@ -58,21 +58,21 @@ class FrameNoise:
         self._generator = np.random.default_rng()
         self._generator.bit_generator.state = state
 
-    def pixels(self) -> Array:
+    def pixels(self) -> FloatArray:
         """Pixel noise, shape (640, 480, 3), dtype float32; a view that must not be changed."""
         bank = self._banks[self._generator.integers(_BANKS)]
         top, left = self._generator.integers(_BANK_MARGIN + 1, size=2)
         return bank[top : top + SENSOR_SHAPE[0], left : left + SENSOR_SHAPE[1]]
 
-    def columns(self) -> Array:
+    def columns(self) -> FloatArray:
         """Column streaks, shape (1, 480, 3)."""
         return self._line(SENSOR_SHAPE[1], self._levels.column)[None]
 
-    def rows(self) -> Array:
+    def rows(self) -> FloatArray:
         """Row offsets, shape (640, 1, 3)."""
         return self._line(SENSOR_SHAPE[0], self._levels.row)[:, None]
 
-    def _line(self, length: int, level: Array) -> Array:
+    def _line(self, length: int, level: FloatArray) -> FloatArray:
         white = self._generator.standard_normal((1, length, 3), np.float32)
         line = cv2.GaussianBlur(white, (0, 0), _LINE_BLUR_PX, sigmaY=1e-3, borderType=cv2.BORDER_REFLECT)[0]
         return (line * (level * np.float32(np.sqrt(2.0 * np.sqrt(np.pi) * _LINE_BLUR_PX)))).astype(np.float32)
@@ -107,18 +107,18 @@ class Drift:
         self.field = self._draw()
         return True
 
-    def _innovation(self) -> Array:
+    def _innovation(self) -> FloatArray:
         """Normal deviates whose common size varies: now and then all of the light changes at once."""
         size = np.exp(_BURSTS * self._generator.standard_normal() - _BURSTS**2)
         return (self._generator.standard_normal(self._scale.shape) * size * self._scale).astype(np.float32)
 
-    def _draw(self) -> Array:
+    def _draw(self) -> FloatArray:
         height, width = SENSOR_SHAPE
         coarse = cosine_field(self._state.astype(np.float32), _DRIFT_SHAPE)
         return np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
 
 
-def _falling(count: int, power: float) -> Array:
+def _falling(count: int, power: float) -> FloatArray:
     """Amplitudes of the cosines above the constant one, the sum of their squares 1."""
     amplitudes = np.arange(1, count) ** power
     return (amplitudes / np.sqrt(np.square(amplitudes).sum())).astype(np.float32)

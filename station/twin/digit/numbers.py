@@ -5,9 +5,8 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float32]
+from station.twin.gel import FloatArray
 
 FILE = "fitted.npz"
 
@@ -16,14 +15,14 @@ FILE = "fitted.npz"
 class NoiseLevels:
     """Standard deviations in grey levels of one frame, each of shape (3,), channels B, G, R."""
 
-    pixel: Array
-    column: Array
-    row: Array
-    offset: Array
+    pixel: FloatArray
+    column: FloatArray
+    row: FloatArray
+    offset: FloatArray
     """Of the whole frame by the slow drift of the light."""
-    drift_along: Array
+    drift_along: FloatArray
     """Of the columns' means by the same drift."""
-    drift_down: Array
+    drift_down: FloatArray
     """Of the rows' means by the same drift."""
 
 
@@ -31,14 +30,14 @@ class NoiseLevels:
 class Fitted:
     """All that the twin's DIGIT has learned from real images."""
 
-    table: Array
+    table: FloatArray
     """Grey levels, shape (knots, directions, places, 3): see `station.twin.digit.optics`."""
     smoothing_mm: float
-    background_mean: Array
+    background_mean: FloatArray
     """Cosine coefficients of the logarithm of a no-contact image, shape (3, rows, columns)."""
-    background_modes: Array
+    background_modes: FloatArray
     """Its principal variations from unit to unit, one standard deviation each, shape (modes, 3, rows, columns)."""
-    background_fitted: Array
+    background_fitted: FloatArray
     """The coefficients of the unit that the table was fitted on, shape (modes,)."""
     noise: NoiseLevels
 

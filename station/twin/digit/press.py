@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from station.twin.contact import FruitOnGel, Mask, Pose
-from station.twin.digit.sensor import Condition, DigitSensor, Image
+from station.twin.digit.codec import Image
+from station.twin.digit.sensor import Condition, DigitSensor
 from station.twin.fruit import Fruit, Kind, draw_fruit
 from station.twin.gel import Gel
 from station.twin.squeeze import Squeeze

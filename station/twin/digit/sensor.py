@@ -6,18 +6,15 @@ from typing import Literal
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from station.twin.digit.backgrounds import background
-from station.twin.digit.codec import as_jpeg
+from station.twin.digit.codec import Image, as_jpeg
 from station.twin.digit.debris import dent_of, moved, scattered
 from station.twin.digit.loaded import LoadedLight
 from station.twin.digit.noise import Drift, FrameNoise
-from station.twin.digit.numbers import Array, Fitted
+from station.twin.digit.numbers import Fitted
 from station.twin.digit.optics import Optics
 from station.twin.gel import GRID_STEP, MM_PER_PX, SENSOR_SHAPE, FloatArray
-
-Image = npt.NDArray[np.uint8]
 
 Colour = Literal["blue", "green", "red"]
 _CHANNEL: dict[Colour, int] = {"blue": 0, "green": 1, "red": 2}
@@ -41,7 +38,7 @@ class Condition:
     fog: float = 0.0
     """0 clear to 1: the image blurs towards a grey veil."""
     dirt: int = 0
-    """Crumbs stuck on the gel: they dent it all the time."""
+    """Number of particles on the gel: they dent it all the time."""
     wear: float = 0.0
     """0 new to 1 worn through: the coating reflects less of the light that a dent turns, most in the middle."""
     light: tuple[float, float, float] = _FULL_LIGHT
@@ -128,10 +125,10 @@ class DigitSensor:
             cv2.addWeighted(pixels[strip], float(factor), lined, 1.0, 0.0, dst=image[strip], dtype=cv2.CV_8U)
         return image
 
-    def _drifted(self) -> Array:
+    def _drifted(self) -> FloatArray:
         return np.asarray(cv2.scaleAdd(self._drift.field, self._drift_factor, self._clean), np.float32)
 
-    def _draw(self, dent: FloatArray | None, condition: Condition) -> Array:
+    def _draw(self, dent: FloatArray | None, condition: Condition) -> FloatArray:
         generator = np.random.default_rng([self._seed, 5])
         pressed = dent  # without the debris, which is there in the reference too
         if condition.dirt:
@@ -157,7 +154,7 @@ class DigitSensor:
             image = blurred * (1.0 - 0.7 * condition.fog) + blurred.mean() * 0.7 * condition.fog
         return image.astype(np.float32, copy=False)
 
-    def _load(self, image: Array, dent: FloatArray, condition: Condition) -> None:
+    def _load(self, image: FloatArray, dent: FloatArray, condition: Condition) -> None:
         """Add the light of a loaded gel to an image."""
         if not (condition.bands or condition.depth_shade):
             return
@@ -186,14 +183,14 @@ def _fitted_levels() -> tuple[float, ...]:
     return tuple(cv2.mean(background(_fitted(), None))[:3])
 
 
-def _worn(wear: float) -> Array:
+def _worn(wear: float) -> FloatArray:
     """What a worn coating leaves of the light's change, shape (640, 480, 1)."""
     rows, columns = (np.linspace(-1.0, 1.0, side, dtype=np.float32) for side in SENSOR_SHAPE)
     from_middle = np.square(rows)[:, None] + np.square(columns)
     return (1.0 - np.float32(_WORN_LOSS * wear) * np.exp(-from_middle / 2)).astype(np.float32)[..., None]
 
 
-def _tear(image: Array, background_image: Array, generator: np.random.Generator) -> None:
+def _tear(image: FloatArray, background_image: FloatArray, generator: np.random.Generator) -> None:
     """Draw a jagged tear from one side to the other into an image."""
     rows, columns = SENSOR_SHAPE
     x = np.linspace(0, columns - 1, 9)

@@ -11,7 +11,8 @@ import numpy as np
 
 from station.twin.clock import Clock
 from station.twin.contact import Footprint
-from station.twin.digit.sensor import Colour, Condition, DigitSensor, Image
+from station.twin.digit.codec import Image
+from station.twin.digit.sensor import Colour, Condition, DigitSensor
 from station.twin.digit.spoil import FRAME_FAULTS, spoiled
 from station.twin.digit.wire import packed, read_request
 from station.twin.faults import CommonFault, FaultBoard
@@ -28,22 +29,29 @@ _SLOWEST = 10.0
 _LONGEST_PERIOD_S = 60.0
 _SLICE_S = 0.05
 """How soon a fault that was cleared lets go of the drawing."""
-_MOST_CRUMBS = 200
+_MOST_SPECKS = 200
 _REQUEST_DEADLINE_S = 5.0
 _LOG = logging.getLogger(__name__)
 
 
 def digit_faults() -> FaultBoard:
-    """The switches of the twin's DIGIT, with what their amounts mean.
+    """The switches of the twin's DIGIT.
 
-    `off` cuts every connection at once; `stuck` sends the same pixels under new sequence numbers; `garbage` sends
-    random bytes; `wrong` sends frames of the 320x240 mode; `slow` divides the frame rate by the amount (ten where
-    it is 1 or less; a frame a minute comes at least);
-    `delayed` sends frames that many seconds late, 3 at most; `intermittent` cuts every connection
-    each time that many seconds have passed. `gel_torn`, `dirt` (amount: crumbs, 200 at most),
-    `lens_fogged` and `gel_worn` (amount: 0 to 1) and
-    `led_dead` (amount: 1 red, 2 green, 3 blue) change the picture. `frame_torn`, `frame_shifted`, `frame_black` and
-    `frame_saturated` spoil whole frames.
+    | fault | meaning | amount |
+    |---|---|---|
+    | off | connections refused and cut | none |
+    | intermittent | every connection is cut each time a period has passed | the period, s |
+    | stuck | the same pixels under new sequence numbers | none |
+    | garbage | random bytes | none |
+    | wrong | frames of the 320x240 mode | none |
+    | slow | the frame rate divided by the amount; a frame a minute comes at least | times; ten where it is 1 or less |
+    | delayed | frames come late | s, at most 3 |
+    | gel_torn | a tear across the gel | none |
+    | gel_worn | the coating reflects less | 0 to 1 |
+    | led_dead | one LED is off | 1 red, 2 green, 3 blue |
+    | lens_fogged | the image blurs towards a grey veil | 0 to 1 |
+    | dirt | particles stick on the gel | specks, at most 200 |
+    | frame_torn, frame_shifted, frame_black, frame_saturated | whole frames are spoiled | none |
     """
     return FaultBoard("camera", (*GEL_FAULTS, *FRAME_FAULTS))
 
@@ -180,7 +188,7 @@ class DigitCameraServer:
             torn=faults.active("gel_torn"),
             wear=_within(0.0, faults.amount("gel_worn"), 1.0),
             fog=_within(0.0, faults.amount("lens_fogged"), 1.0),
-            dirt=round(_within(0.0, faults.amount("dirt"), _MOST_CRUMBS)),
+            dirt=round(_within(0.0, faults.amount("dirt"), _MOST_SPECKS)),
             light=(blue / _BRIGHTEST, green / _BRIGHTEST, red / _BRIGHTEST),
         )
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from station.twin.digit.sensor import Image
+from station.twin.digit.codec import Image
 from station.twin.faults import FaultBoard
 
 FRAME_FAULTS = ("frame_torn", "frame_shifted", "frame_black", "frame_saturated")

@@ -1,4 +1,4 @@
-"""A TCP door of the twin that comes and goes with the gripper's faults."""
+"""TCP listener of the twin's gripper: its port is closed while a fault makes the gripper unreachable."""
 
 import asyncio
 from abc import ABC, abstractmethod
@@ -23,7 +23,7 @@ async def disturbed(answer: bytes, faults: FaultBoard) -> bytes:
 class Listener(ABC):
     """Listens on one address, runs a session for each connection, and is not there while the gripper is gone."""
 
-    def __init__(self, gripper: RobotiqGripper, host: str, port: int) -> None:
+    def __init__(self, gripper: RobotiqGripper, host: str = "127.0.0.1", port: int = 0) -> None:
         self.host = host
         self.port = port
         """The port listened on; where 0 was asked for, the one that was found at `start`."""
@@ -42,7 +42,7 @@ class Listener(ABC):
         self._watcher = asyncio.create_task(self._watch(), name=f"twin gripper watch {self.port}")
 
     async def stop(self) -> None:
-        """Close the door and every connection."""
+        """Close the port and every connection."""
         if self._watcher:
             self._watcher.cancel()
             with suppress(asyncio.CancelledError):

@@ -14,15 +14,9 @@ from station.twin.robotiq.listener import Listener, disturbed
 from station.twin.robotiq.model import RobotiqGripper
 from station.twin.robotiq.rtu import LONGEST_FRAME, RequestFramer, answer
 
-PORT = 54321
-"""The port of the RS-485 URCap."""
-
 
 class RtuOverTcpServer(Listener):
     """RTU frames over TCP, any number of clients."""
-
-    def __init__(self, gripper: RobotiqGripper, host: str = "127.0.0.1", port: int = PORT) -> None:
-        super().__init__(gripper, host, port)
 
     async def _session(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         framer = RequestFramer()

@@ -10,10 +10,7 @@ from typing import Any
 
 from station.twin.robotiq.faults import GripperFault
 from station.twin.robotiq.listener import Listener, disturbed
-from station.twin.robotiq.model import RobotiqGripper
 from station.twin.robotiq.registers import Command
-
-PORT = 63352
 
 _WRITABLE = {
     "ACT": "activate",
@@ -32,9 +29,6 @@ _NONSENSE = b"?\n"
 
 class UrcapServer(Listener):
     """The socket in front of one gripper."""
-
-    def __init__(self, gripper: RobotiqGripper, host: str = "127.0.0.1", port: int = PORT) -> None:
-        super().__init__(gripper, host, port)
 
     async def _session(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         while True:

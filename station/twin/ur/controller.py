@@ -85,8 +85,8 @@ class UrController:
             host: any 127.0.0.N; the ports are the real ones.
             clock: what moves the arm.
             faults: from `arm_faults`.
-            polyscope: the version that is told.
-            joints_rad: where the arm stands.
+            polyscope: the PolyScope version that the controller reports.
+            joints_rad: the joints' first positions, rad.
             joint_range_rad: how far the safety configuration lets each joint turn either way.
             running: powered and released from the start.
         """

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING
 
 from station.twin.faults import CommonFault
@@ -111,7 +112,7 @@ class Network:
                 return
 
     @contextlib.asynccontextmanager
-    async def _stream(self, writer: asyncio.StreamWriter, *, programs: bool = False):  # noqa: ANN202
+    async def _stream(self, writer: asyncio.StreamWriter, *, programs: bool = False) -> AsyncIterator[None]:
         task = asyncio.current_task()
         assert task is not None  # noqa: S101 (a coroutine always runs in one)
         self._streams[task] = writer

@@ -21,7 +21,7 @@ PORT = 30004
 FREQUENCY_HZ = 500.0
 LEAST_FREQUENCY_HZ = 1.0
 LARGEST_PACKAGE_BYTES = 65535
-"""A package tells its size in 16 bits."""
+"""A package's size field has 16 bits."""
 SLOW_READER_S = 10.0
 SEND_BUFFER_BYTES = 32768
 HEADER = struct.Struct(">HB")
@@ -232,9 +232,8 @@ class RtdeConnection(asyncio.Protocol):
         self._reply(PAUSE, b"\x01")
 
     def _data(self, payload: bytes) -> None:
-        recipe = self._inputs[payload[0]] if payload else None
-        if recipe is not None:
-            self._controller.write_inputs(recipe.unpack(payload[1:]))
+        if payload:
+            self._controller.write_inputs(self._inputs[payload[0]].unpack(payload[1:]))
 
 
 def _write_if_open(transport: asyncio.Transport, data: bytes) -> None:
