@@ -23,12 +23,10 @@ class StagedMethod:
         *,
         firm_only: bool = False,
     ) -> Contact:
-        """See `Method.measure`."""
+        """See `Method.measure`; `on_stage` has no part."""
         self.pictures = {}
 
         def keep(name: str, picture: npt.NDArray[np.uint8]) -> None:
             self.pictures[name] = picture
-            if on_stage is not None:
-                on_stage(name, picture)
 
         return self._method.measure(image, keep, previous, agreed, firm_only=firm_only)

@@ -29,9 +29,16 @@ from station.vision.image_quality import light, sharpness
 from station.vision.scale import Scale
 
 NOISE_FRAMES = 30
+"""Frames of the untouched gel, of which noise and reference are made. An estimate."""
+_GATE_FRAMES = 6
+"""About so many of them, evenly spaced, are measured for the gate's noise. An estimate."""
+_ROOM_MM = 4.0
+"""Width of the fingers at the start beyond ball and holder, where the recipe gives no width: the paper begins at 46 mm
+and meets the ball at 42 mm."""
 _PLACES_CLOSING_MM = 2.0
 """Deep enough for a good centre, shallow enough to stay inside the field also away from the middle."""
 _LEAST_WAY_MM = 2.0
+"""Distance of two places of the ball, below which they give no scale. An estimate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,11 +125,11 @@ class CalibrationProcedure:
         findings = await asyncio.to_thread(gel.examine, reference, None, self._settings.least_light)
         if findings:
             raise RefusedError(
-                *(messages.FAULT_AND_REMEDY(fault=each.message, remedy=gel.REMEDIES[each.ill]()) for each in findings)
+                *(messages.FAULT_AND_REMEDY(fault=each.message, remedy=gel.REMEDIES[each.fault]()) for each in findings)
             )
         if max(await asyncio.to_thread(lambda: figures.pixel_noise(frames).mean(axis=(0, 1)))) == 0:
             raise RefusedError(messages.FRAMES_EQUAL())
-        some = taken.frames[:: max(1, len(frames) // 6)]
+        some = taken.frames[:: max(1, len(frames) // _GATE_FRAMES)]
         untouched = [(await self._press.measure(replace(taken, frames=(frame,)))).contact for frame in some]
         steps = await self._press_through()
         first = next(step for step in steps if step.contact.is_firm)
@@ -135,7 +142,7 @@ class CalibrationProcedure:
 
     async def _press_through(self) -> list[Step]:
         plan = self._recipe.steps
-        start_mm = plan.start_width_mm or self._settings.ball_mm + self._settings.holder_mm + 4.0
+        start_mm = plan.start_width_mm or self._settings.ball_mm + self._settings.holder_mm + _ROOM_MM
         steps: list[Step] = []
         for number in range(plan.number + 1):
             step = await self._press.step(start_mm - number * plan.step_mm)

@@ -16,9 +16,14 @@ from station.vision.scale import TYPICAL_UNCERTAINTY
 ROUNDEST = 1.15
 """Largest ratio of a ball contact's axes."""
 _LEAST_STEPS = 5
-_LEAST_CONFIDENCE = 0.5
+"""Whole contacts that a calibration's curve needs. An estimate."""
+LEAST_CONFIDENCE = 0.5
+"""Confidence of an area from which it is no doubtful one. An estimate."""
 _SCALES_MM = (0.022, 0.034)
+"""Smallest and largest scale that is accepted, mm of the gel per pixel: on either side of what is published for single
+DIGIT units, 0.0255 to 0.0291. Estimates."""
 _MOST_GATE_FACTOR = 1.6
+"""Largest factor by which a noisy unit's detection threshold may be raised. An estimate."""
 
 
 def calibration_checks(
@@ -69,9 +74,9 @@ def calibration_checks(
         ),
         Check(
             name="confidence",
-            passed=confidence >= _LEAST_CONFIDENCE,
+            passed=confidence >= LEAST_CONFIDENCE,
             found=messages.WORST_CONFIDENCE(value=confidence),
-            expected=messages.AT_LEAST(value=_LEAST_CONFIDENCE),
+            expected=messages.AT_LEAST(value=LEAST_CONFIDENCE),
             remedy=messages.DO_CONFIDENCE(),
         ),
         Check(

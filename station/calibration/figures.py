@@ -11,11 +11,13 @@ from station.calibration.model import FieldMap, Levels, Noise, PlacePoint, Press
 from station.vision.contact import Contact, Image
 
 FIELD_ROWS, FIELD_COLUMNS = 16, 12
+"""Cells of the field map, 40 px square in an image of 640x480. A resolution."""
 QUIET_GATE = 0.8
 """Largest value of the gate's statistic with nothing touching, after the unit's factor."""
 _CENTROID_PX = 1.0
 """Two standard deviations of a centroid in repeats on the twin."""
 _STEP_MM = 0.5
+"""Half a width step of the ball's recipe: a width that the gripper meets this far beyond a limit still counts."""
 
 
 def noise(frames: Sequence[Image], untouched: Sequence[Contact]) -> Noise:

@@ -1,8 +1,6 @@
 """Contact gate of a recipe, raised on a unit that is noisier than most."""
 
-from station.settings.segmentation import Segmentation
-
-_MOST_RATIO, _MOST_BEND = 20.0, 10.0
+from station.settings.segmentation import LARGEST_GATE_RATIO, LARGEST_LEAST_BEND, Segmentation
 
 
 def gated(segmentation: Segmentation, factor: float) -> Segmentation:
@@ -11,7 +9,7 @@ def gated(segmentation: Segmentation, factor: float) -> Segmentation:
         return segmentation
     robust = segmentation.robust
     raised = {
-        "gate_ratio": min(_MOST_RATIO, factor * robust.gate_ratio),
-        "least_bend": min(_MOST_BEND, factor * robust.least_bend),
+        "gate_ratio": min(LARGEST_GATE_RATIO, factor * robust.gate_ratio),
+        "least_bend": min(LARGEST_LEAST_BEND, factor * robust.least_bend),
     }
     return segmentation.model_copy(update={"robust": robust.model_copy(update=raised)})

@@ -18,12 +18,17 @@ from station.vision.contact import Image, Mask
 from station.vision.image_quality import DEAD_LED, light, sharpness
 
 _LONG_SIDE_PX = 640
+"""Long side of the image for which the numbers in pixels are given: they scale with the image."""
 _FINE_PX, _COARSE_PX = 1.5, 12.0
 """The difference of these two blurs shows a tear or debris and not the drift of the light."""
 _BLEMISH_LEVELS, _NEW_BLEMISH_LEVELS = 20.0, 12.0
+"""Grey levels by which a blemish differs from its surroundings: without an earlier picture, and against one."""
 _JOINED_PX = 7
+"""Gaps between pixels of one blemish that are bridged. An estimate."""
 _SMALLEST_PX, _SMALLEST_NEW_PX = 40, 150
+"""Areas below which it is no blemish: without an earlier picture, and against one."""
 _BORDER_SHARE = 0.06
+"""Share of the width that is not checked along each border: there sensors differ most."""
 _MOST_BLEMISHED = 0.006
 """Real units reach 0.0032 of the field."""
 _TEAR_LENGTH, _TEAR_SLENDERNESS = 0.5, 10.0
@@ -55,7 +60,7 @@ REMEDIES = {
 class Finding:
     """One fault with a picture of it."""
 
-    ill: GelFault
+    fault: GelFault
     message: Message
     picture: Image
 

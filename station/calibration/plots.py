@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from station.calibration.checks import LEAST_CONFIDENCE
 from station.calibration.model import Calibration, FieldMap, PressPoint
 from station.charts.report import png
 
 _BLUE, _RED, _GREY = "#1f4e79", "#b3261e", "#888888"
-_DOUBTFUL = 0.5
 
 
 def area_plot(calibration: Calibration, now: Sequence[PressPoint] | None = None) -> bytes:
@@ -52,7 +52,7 @@ def _draw(axes, curve: Sequence[PressPoint], colour: str, label: str, mm_per_px:
     sure, doubted = [], []
     for index, point in enumerate(curve):
         lost = index > first and not point.area_px
-        doubtful = point.cut or lost or (point.confidence is not None and point.confidence < _DOUBTFUL)
+        doubtful = point.cut or lost or (point.confidence is not None and point.confidence < LEAST_CONFIDENCE)
         (doubted if doubtful else sure).append((point.width_mm, point.area_px * mm_per_px**2))
     if sure:
         axes.plot(*zip(*sure, strict=True), color=colour, marker="o", markersize=4, linewidth=1.5, label=label)

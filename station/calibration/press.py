@@ -27,7 +27,9 @@ from station.vocabulary import Flag
 log = logging.getLogger(__name__)
 
 _CONTRAST_BLUR_PX = 2.0
+"""Standard deviation of the smoothing of the change whose strength is measured. An estimate."""
 _CONTRAST_PERCENTILE = 90.0
+"""Percentile of the change around a contact that is its strength: a few pixels do not decide it. An estimate."""
 _ROOM = 1.2
 """Share of a contact's radius: the gel changes most just inside and outside its edge."""
 

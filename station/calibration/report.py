@@ -55,7 +55,7 @@ def verification_files(verified: VerificationResult, calibration: Calibration) -
         facts=[
             ("Unit", calibration.unit),
             ("Calibration", str(calibration.summary())),
-            ("Operator", verification.operator or "not told"),
+            ("Operator", verification.operator or "not given"),
             ("Made", f"{verification.made_at:%Y-%m-%d %H:%M:%S} UTC"),
         ],
         checks=[(check, data_uri(pictures[check.picture]) if check.picture else None) for check in verification.checks],
@@ -79,7 +79,7 @@ def refusal_files(refusal: Refusal, evidence: Evidence) -> dict[str, bytes]:
         verdict=False,
         facts=[
             ("Unit", refusal.unit),
-            ("Operator", refusal.operator or "not told"),
+            ("Operator", refusal.operator or "not given"),
             ("Made", f"{refusal.made_at:%Y-%m-%d %H:%M:%S} UTC"),
             *(("Refused", str(reason)) for reason in refusal.reasons),
         ],
@@ -104,7 +104,7 @@ def _calibration_facts(calibration: Calibration) -> list[tuple[str, str]]:
     noise = calibration.noise
     return [
         ("Unit", f"{calibration.unit}{', simulated' if calibration.simulated else ''}"),
-        ("Operator", calibration.operator or "not told"),
+        ("Operator", calibration.operator or "not given"),
         ("Made", f"{calibration.made_at:%Y-%m-%d %H:%M:%S} UTC, fruit-station {calibration.program}"),
         ("Scale", f"{calibration.mm_per_px:.5f} mm/px ± {calibration.scale_uncertainty:.1%}, {how}"),
         ("Areas", f"in mm² good to {calibration.area_uncertainty:.1%}, beside what repeating an image differs by"),

@@ -8,7 +8,7 @@ import contextlib
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TypeVar
 
@@ -138,7 +138,7 @@ class CalibrationStore:
             raise _not_stored(folder / name, error) from error
         return Prepared(unfinished, folder / name)
 
-    def _all(self, kind: str, serial: str, model: type[RecordT]):  # noqa: ANN202 (an iterator of the model)
+    def _all(self, kind: str, serial: str, model: type[RecordT]) -> Iterator[RecordT]:
         with contextlib.suppress(ValidationError):
             folder = self._home / kind / _SERIAL.validate_python(serial)
             for path in sorted(_folders(folder), reverse=True):

@@ -18,6 +18,7 @@ from station.settings.recipe import Recipe
 from station.vision.contact import Image
 
 _NOISE_FRAMES = 9
+"""Frames of the untouched gel, of which noise and reference are made. An estimate."""
 _EVERY = 2
 """One of so many widths of the calibration is pressed."""
 _SOUND = {
@@ -83,10 +84,10 @@ class VerificationProcedure:
         curve = tuple(step.point for step in steps)
         blue, green, red = (float(level) for level in pixel_levels)
         checks = verification_checks(self._settings, self._calibration, curve, onset_mm, (blue, green, red))
-        if not any(finding.ill in {GelFault.LED, GelFault.FOG} for finding in findings):
+        if not any(finding.fault in {GelFault.LED, GelFault.FOG} for finding in findings):
             findings += self._worn(steps)
-        pictures = {f"{finding.ill}.png": finding.picture for finding in findings}
-        checks += [self._health(ill, findings) for ill in GelFault]
+        pictures = {f"{finding.fault}.png": finding.picture for finding in findings}
+        checks += [self._health(fault, findings) for fault in GelFault]
         pictures |= {press_name(number): outlined(step) for number, step in enumerate(steps)}
         verification = Verification(
             id=stamp(datetime.now(UTC)),
@@ -129,15 +130,15 @@ class VerificationProcedure:
         return [Finding(GelFault.WEAR, worn, gel.side_by_side(self._presses[widths.index(min(widths))], now.image))]
 
     @staticmethod
-    def _health(ill: GelFault, findings: list[Finding]) -> Check:
-        found = next((finding for finding in findings if finding.ill is ill), None)
+    def _health(fault: GelFault, findings: list[Finding]) -> Check:
+        found = next((finding for finding in findings if finding.fault is fault), None)
         return Check(
-            name=ill,
+            name=fault,
             passed=found is None,
-            found=_SOUND[ill]() if found is None else found.message,
+            found=_SOUND[fault]() if found is None else found.message,
             expected=messages.AS_BEFORE(),
-            remedy=REMEDIES[ill](),
-            picture=None if found is None else f"{ill}.png",
+            remedy=REMEDIES[fault](),
+            picture=None if found is None else f"{fault}.png",
         )
 
 

@@ -51,7 +51,7 @@ class Position:
     requested_mm: float | None = None
     """What the move was to reach; None outside a move."""
     state: str = ""
-    """The gripper's own word for the two above."""
+    """The gripper's own word for `held` and `blocked`."""
     current_a: float | None = None
     """Of the motor; None where it is not known."""
 

@@ -7,6 +7,9 @@ from pydantic import model_validator
 from station.messages import settings as messages
 from station.settings.model import Settings, setting
 
+LARGEST_GATE_RATIO, LARGEST_LEAST_BEND = 20.0, 10.0
+"""No gate ratio, and no minimum curvature response in grey levels per pixel, may be larger. Estimates."""
+
 
 class PaperParameters(Settings):
     """Parameters of the pipeline as printed in Computers and Electronics in Agriculture 235 (2025) 110397."""
@@ -112,7 +115,7 @@ class RobustParameters(Settings):
         title="Gate",
         description="Contact is searched where the curvature response exceeds the background's median by this factor.",
         ge=1.5,
-        le=20.0,
+        le=LARGEST_GATE_RATIO,
     )
     least_bend: float = setting(
         0.15,
@@ -121,7 +124,7 @@ class RobustParameters(Settings):
         "light drifts by as much.",
         unit="grey level/px",
         ge=0.01,
-        le=10.0,
+        le=LARGEST_LEAST_BEND,
     )
     smallest_contact_px: int = setting(
         500,

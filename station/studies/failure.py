@@ -5,8 +5,12 @@ from enum import StrEnum
 
 import numpy as np
 
+from station.studies.cohort import STEP_MM
+
 LARGEST_FALL = 0.10
+"""Share of its running maximum by which the area may fall. An estimate."""
 LARGEST_ERROR = 0.50
+"""Share of the true area by which the area may be wrong at a result's closing. An estimate."""
 
 DEFINITION = (
     "A sample counts as failed when no contact is found in any of its images; or when the area, from the first image "
@@ -46,7 +50,7 @@ def failures(
     """
     closings = np.asarray(closings_mm, float)
     measured, truth = np.asarray(areas, float), np.asarray(true_areas, float)
-    counted = measured if from_mm is None else measured[closings >= from_mm - 0.5]
+    counted = measured if from_mm is None else measured[closings >= from_mm - STEP_MM / 2]
     if not (counted > 0).any():
         return frozenset({Cause.NO_CONTACT})
     found = counted[int(np.argmax(counted > 0)) :]

@@ -47,7 +47,8 @@ def identity_of(task: Task) -> Identity:
     digest = hashlib.sha256(segmentation_of(task.fruit, task.method).model_dump_json().encode())
     for name in (*_DRAWN_BY, *_MEASURED_BY[task.method]):
         place = root / name
-        for file in [place] if place.is_file() else sorted(place.glob("*.[pn][yp]*")):
+        files = [place] if place.is_file() else sorted(f for f in place.iterdir() if f.suffix in {".py", ".npz"})
+        for file in files:
             digest.update(file.read_bytes())
     return Identity(fruit=task.fruit, method=task.method, seed=task.seed, measured_by=digest.hexdigest()[:16])
 

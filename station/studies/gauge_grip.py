@@ -25,10 +25,15 @@ from station.vision.median import median_image
 from station.vision.methods import make_method
 
 _FRAME_S, _STEP_S = 1 / 30, 0.5
+"""Time of a frame at 30 a second, and of one width step. An estimate."""
 _APPROACH_MM = 2.0
+"""Distance from the fruit's true width at which the search for the first contact begins. An estimate."""
 _MOST_COUNTS = 40
+"""Counts of the gripper that are searched for the first contact. An estimate."""
 _HELD_S = 2.0
+"""Time for which a fruit has been held where its true area is computed, so that it has crept. An estimate."""
 _OPEN_BY_MM = 20.0
+"""Width of the open fingers beyond the fruit's. An estimate."""
 CALIBRATION_SD = 0.011
 """Relative standard uncertainty of a calibrated scale: half the ± 2.2 %, two standard deviations, that `station
 calibrate` states at three places (docs/calibration.md)."""
@@ -43,7 +48,7 @@ def last_limit_mm(recipe: Recipe) -> float:
 
 
 def true_area_mm2(fruit: Fruit, pose: Pose, closing_mm: float) -> float:
-    """The true area at a closing from the true first contact, held for a while: what a perfect gauge would say."""
+    """The true area at a closing from the true first contact, held for a while: what a perfect gauge would measure."""
     gel = Gel()
     return FruitOnGel(fruit, pose, gel).pressed(Squeeze(fruit, gel, _HELD_S).at(closing_mm)).true_area_mm2
 

@@ -3,7 +3,6 @@
 import contextlib
 import errno
 import json
-import os
 import shutil
 import tempfile
 from collections.abc import Sequence
@@ -11,6 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from station.atomic_file import write_atomically
 from station.errors import BadInputError, StationError
 from station.studies.agreement import Agreement, agreement
 from station.studies.gauge import Gauge, analyse
@@ -84,10 +84,7 @@ def store(study: GaugeStudy, page: str, out: Path) -> None:
     unfinished = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
     try:
         for name, data in files.items():
-            with (unfinished / name).open("wb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
+            write_atomically(unfinished / name, data)
         unfinished.chmod(0o755)
         with contextlib.suppress(FileNotFoundError):
             out.rmdir()

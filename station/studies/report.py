@@ -5,14 +5,12 @@ from importlib.metadata import version
 from station.binomial import clopper_pearson
 from station.charts.report import data_uri, templates
 from station.studies import figures
-from station.studies.cohort import PAPER_FAILURES
+from station.studies.cohort import PAPER_FAILURES, PAPER_SAMPLES
 from station.studies.failure import DEFINITION, Cause, image_at
 from station.studies.folder import StudyFolder, identity_of
 from station.studies.sample import Task, segmentation_of
 from station.studies.study import Study, summary
 from station.twin.gel import MM_PER_PX
-
-PAPER_SAMPLES = 30
 
 
 def share(count: int, of: int) -> str:
@@ -67,14 +65,17 @@ def _failures(study: Study) -> list[tuple[str, str, str]]:
     number = len(study.samples)
     paper = PAPER_FAILURES.get(study.request.kind)
     later = sum(map(bool, study.later_causes))
-    told = {
+    words_of = {
         Cause.NO_CONTACT: "no contact found",
         Cause.FALLING_AREA: "area falls by more than 10 %",
         Cause.WRONG_AREA: "area wrong by more than 50 %",
     }
     return [
-        ("failed", share(study.failed, number), "not told" if paper is None else share(paper, PAPER_SAMPLES)),
-        *((f"… {words}", share(sum(cause in c for c in study.causes), number), "") for cause, words in told.items()),
+        ("failed", share(study.failed, number), "not reported" if paper is None else share(paper, PAPER_SAMPLES)),
+        *(
+            (f"… {words}", share(sum(cause in c for c in study.causes), number), "")
+            for cause, words in words_of.items()
+        ),
         (
             f"failed, looking only from {study.result_closings_mm[0]:g} mm of closing on",
             share(later, number),

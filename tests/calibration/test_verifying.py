@@ -106,7 +106,7 @@ def test_a_mark_shows_where_the_dirt_lies(drawn_ball):
     [finding] = examine(median_image(asyncio.run(take_reference(ball, 5)).images), golden, 0.75)
     marked = (finding.picture == (0, 0, 255)).all(axis=2)
     now = median_image(asyncio.run(take_reference(ball, 5)).images).astype(float)
-    crumb = np.abs(now - golden).max(axis=2) > 25
+    speck = np.abs(now - golden).max(axis=2) > 25
     rows, columns = np.nonzero(marked)
-    inside = crumb[rows.min() : rows.max(), columns.min() : columns.max()]
-    assert inside.sum() > 0.9 * crumb.sum() > 50
+    inside = speck[rows.min() : rows.max(), columns.min() : columns.max()]
+    assert inside.sum() > 0.9 * speck.sum() > 50

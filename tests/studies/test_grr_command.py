@@ -1,6 +1,7 @@
 """`station grr` as a user gives it."""
 
 import json
+import os
 import signal
 from pathlib import Path
 
@@ -119,7 +120,7 @@ def test_a_full_disk_leaves_nothing(measurements: Path, tmp_path: Path, monkeypa
     def full(_descriptor: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(grr_room.os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", full)
     found = asked(measurements, "--out", tmp_path / "out")
     assert isinstance(found.exception, StationError)
     assert "nothing is stored: free space" in str(found.exception)

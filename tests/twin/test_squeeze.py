@@ -53,7 +53,7 @@ def test_a_hard_spheres_contact_is_hertzs(closing_mm):
 
 
 @given(st.floats(0.05, 1.5))
-def test_the_dent_goes_over_into_its_skirt_without_a_step(approach_mm):
+def test_the_dent_goes_over_into_its_halo_without_a_step(approach_mm):
     ball = Surface(3.0, 3.0)
     distance_mm = np.linspace(0, 8, 1601, dtype=np.float32)[None]
     dent = dent_mm(ball.gap_mm(np.square(distance_mm / 3.0)), approach_mm, ball, Gel())[0]
@@ -63,7 +63,7 @@ def test_the_dent_goes_over_into_its_skirt_without_a_step(approach_mm):
     assert dent[-1] < 0.02 * approach_mm
 
 
-def test_hertzs_skirt_has_its_known_values():
+def test_hertzs_halo_has_its_known_values():
     ratio_squared = np.array([1.0, 4.0], np.float32)
     # At twice the radius: (-2·asin(1/2) + √3) / π, by hand.
     assert half_space_surface(ratio_squared) == pytest.approx([0.5, (np.sqrt(3) - np.pi / 3) / np.pi], abs=1e-6)
