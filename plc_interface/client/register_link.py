@@ -95,7 +95,7 @@ class RegisterLink:
             last: the last group's name; they must fit 125 registers and follow each other without a gap.
         """
         begin, end = GROUP_BY_NAME[first], GROUP_BY_NAME[last or first]
-        words = await self._read(begin.address, end.address + end.words - begin.address)
+        words = await self._read(begin.address, end.end - begin.address)
         groups = GROUPS[GROUPS.index(begin) : GROUPS.index(end) + 1]
         return {
             register.name: self._value(register, words[register.address - begin.address :][: register.words])
@@ -104,7 +104,7 @@ class RegisterLink:
         }
 
     async def write(self, values: Mapping[str, float | str]) -> None:
-        """Write neighbouring registers in one request each.
+        """Write registers by name; neighbouring ones go into one request.
 
         Args:
             values: by register name.
@@ -148,13 +148,16 @@ class RegisterLink:
             if words is None:
                 raise ReferencesError(f"{self._where} has no registers at {group.address}: it is no fruit station")
             raise ReferencesError(f"{self._where}: {fault}")
-        said = {name: self._value(BY_NAME[name], words[BY_NAME[name].address - group.address :][: BY_NAME[name].words])
-                for name in ("map_version", "map_checksum")}  # fmt: skip
-        if said["map_version"] != MAP_VERSION:
+        identity = {
+            name: self._value(BY_NAME[name], words[BY_NAME[name].address - group.address :][: BY_NAME[name].words])
+            for name in ("map_version", "map_checksum")
+        }
+        if identity["map_version"] != MAP_VERSION:
             raise ReferencesError(
-                f"{self._where} has version {said['map_version']} of the map, this client has {MAP_VERSION}: update one"
+                f"{self._where} has version {identity['map_version']} of the map, this client has {MAP_VERSION}: "
+                "update one"
             )
-        if said["map_checksum"] != map_checksum():
+        if identity["map_checksum"] != map_checksum():
             await self._check_blocks()
 
     async def _check_blocks(self) -> None:
@@ -162,8 +165,8 @@ class RegisterLink:
         for group in GROUPS:
             if await self._try_read(group.address, group.words) is None:
                 raise ReferencesError(
-                    f"{self._where} has an older map, without all registers {group.address} to "
-                    f"{group.address + group.words - 1}: update the station"
+                    f"{self._where} has an older map, without all registers {group.address} to {group.end - 1}: "
+                    "update the station"
                 )
 
     def _difference(self, words: Sequence[int]) -> str:

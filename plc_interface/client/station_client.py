@@ -228,7 +228,7 @@ class StationClient(RegisterLink):
                 f"the heartbeat has ended ({self._beating.exception()}), and the station disarms: call arm() again"
             )
         if "trigger_acknowledged" in bits:
-            raise NotReadyError("the answer to the trigger before still stands: wait until it has fallen")
+            raise NotReadyError("trigger_acknowledged is still set from the trigger before: wait until it falls")
 
     async def _set(self, control: frozenset[str]) -> None:
         await self.write({"control": CONTROL.flags(control)})

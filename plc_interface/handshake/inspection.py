@@ -11,6 +11,9 @@ from plc_interface.handshake.trigger import note_refusal
 from plc_interface.handshake.work import Work, described, row
 from station.channel.line import BeginReply, Reason, Refusal, StationState
 
+MOST_DISOWNED = 8
+"""Maximum number of refused ids that the station may still begin; the oldest is dropped. An estimate."""
+
 
 def request_begin(work: Work) -> None:
     """`Begin` to the station."""
@@ -104,7 +107,7 @@ def refuse_as_lost(work: Work) -> None:
     work.state.acquiring = True
     if pending is not None:
         work.durable = True
-        work.update_journal(disowned=(*work.state.journal.disowned, pending.trigger_id)[-8:])
+        work.update_journal(disowned=(*work.state.journal.disowned, pending.trigger_id)[-MOST_DISOWNED:])
     refuse_pending(work, Refusal.STATION_LOST)
 
 
@@ -140,9 +143,9 @@ def _ending(words: str, *reasons: Reason) -> Callable[[Work], None]:
     return described(words, give_no_result)
 
 
-late = _ending("NO_RESULT (late) stands, `Published`.", Reason.LATE)
-lost = _ending("NO_RESULT (station lost) stands, `Published`.", Reason.STATION_LOST)
-unsound = _ending("NO_RESULT (internal fault) stands, `Published`.", Reason.INTERNAL_FAULT)
+late = _ending("NO_RESULT (late) is final, `Published`.", Reason.LATE)
+lost = _ending("NO_RESULT (station lost) is final, `Published`.", Reason.STATION_LOST)
+unsound = _ending("NO_RESULT (internal fault) is final, `Published`.", Reason.INTERNAL_FAULT)
 
 
 def drop(work: Work) -> None:

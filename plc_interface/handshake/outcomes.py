@@ -119,6 +119,6 @@ def publish_if_other(work: Work, theirs: Outcome) -> None:
     for ours in (*work.state.journal.verdicts, *work.state.queue):
         if ours.sequence == theirs.sequence:
             if ours != theirs:
-                work.log(f"inspection {ours.sequence}: {theirs.outcome} came after {ours.outcome}, which stands")
+                work.log(f"inspection {ours.sequence}: {theirs.outcome} came after {ours.outcome}, which is final")
                 work.actions.append(NotifyPublished(ours))
             return

@@ -21,7 +21,9 @@ from station.messages import can as messages
 from station.settings.can import CanSettings
 
 REJECTS_LANE = 1
+"""The gate's lane for all rejects."""
 _RETRY_S = 0.05
+"""Pause before a reject is ordered again. An estimate."""
 
 log = logging.getLogger(__name__)
 
@@ -96,7 +98,7 @@ class RejectGate:
         return sure and not (outcome.simulated and self._real)
 
     def _order(self, sequence: int, at_count: int) -> None:
-        pending = asyncio.create_task(self._divert(sequence, at_count), name=f"shot {sequence}")
+        pending = asyncio.create_task(self._divert(sequence, at_count), name=f"reject {sequence}")
         self._rejects.add(pending)
         pending.add_done_callback(self._rejects.discard)
 
@@ -107,7 +109,9 @@ class RejectGate:
                 await self._io.divert(sequence, REJECTS_LANE, at_count)
             except (NotReadyError, InterfaceError, EchoMissingError, RejectLostError) as error:
                 if logged != (logged := type(error).__name__):
-                    log.warning("inspection %d: %s; its shot is ordered until its count is past", sequence, error)
+                    log.warning(
+                        "inspection %d: %s; its reject is ordered again until its count is past", sequence, error
+                    )
                 await asyncio.sleep(_RETRY_S)
                 continue
             except LineIoError as error:

@@ -5,11 +5,10 @@ import logging
 from collections.abc import Mapping
 from pathlib import Path
 
+from plc_interface.outputs.can.counts import RANGE
 from station.atomic_file import write_atomically
 
 log = logging.getLogger(__name__)
-
-_RANGE = 2**32
 
 
 class PendingRejectFile:
@@ -27,12 +26,12 @@ class PendingRejectFile:
             return {}
         except (OSError, ValueError, TypeError, AttributeError) as error:
             log.error(  # noqa: TRY400 (the file is at fault, not the code)
-                "the shots in %s cannot be read (%s): look at the fruit between the nest and the gate",
+                "the pending rejects in %s cannot be read (%s): look at the fruit between the nest and the gate",
                 self._path,
                 type(error).__name__,
             )
             return {}
-        return {sequence: count for sequence, count in counts.items() if 1 <= sequence < _RANGE and 0 <= count < _RANGE}
+        return {sequence: count for sequence, count in counts.items() if 1 <= sequence < RANGE and 0 <= count < RANGE}
 
     def write(self, counts: Mapping[int, int]) -> None:
         """Replace the file by counts as `read` returns them. A failure is logged: the line goes on.
@@ -43,4 +42,4 @@ class PendingRejectFile:
         try:
             write_atomically(self._path, json.dumps(counts).encode(), durable=False)
         except OSError as error:
-            log.error("the shots cannot be written to %s: %s", self._path, error.strerror)  # noqa: TRY400
+            log.error("the pending rejects cannot be written to %s: %s", self._path, error.strerror)  # noqa: TRY400

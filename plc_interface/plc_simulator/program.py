@@ -5,7 +5,7 @@ Pure: a scan's inputs and the time go in, the outputs come out, and each fruit's
 
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 
 from plc_interface.plc_simulator.faults import FaultPlan, LineFault
@@ -25,8 +25,11 @@ ANSWER_LIMIT_S = 10.0
 RESULT_MARGIN_S = 2.0
 """Added to the station's own deadline for a result."""
 _LONGEST_RESULT_S = 120.0
+"""Deadline for a result where the station gives none. An estimate."""
 _FAULT_S = 1.5
+"""Duration of an injected late acknowledgement, or of swapped words. An estimate."""
 _FROZEN_S = 3.0
+"""Duration of an injected frozen heartbeat: longer than the default of `handshake.plc_heartbeat_timeout_s`."""
 _TRIGGER_IDS = 65_535
 _SKIPPED_IDS = 3
 
@@ -85,7 +88,6 @@ class Passage:
 class Counters:
     """The PLC's counters, for comparison with the station's own."""
 
-    decided: dict[Decision, int] = field(default_factory=lambda: dict.fromkeys(Decision, 0))
     stale: int = 0
     """Results whose fruit is not the one in the nest: taken away, never used."""
     doubled: int = 0
@@ -349,7 +351,6 @@ class LineProgram:
         fruit, self._fruit = self._fruit, None
         if fruit is None:
             return
-        self.counters.decided[decision] += 1
         self._playing_after = fruit.fault
         area = _valid(inputs, "result_area_mm2")
         closing = _valid(inputs, "result_closing_mm_x100")

@@ -44,10 +44,10 @@ def docs(out: Path, check: bool) -> None:  # noqa: FBT001 (click passes argument
         for path in written:
             click.echo(f"wrote {path}")
         if not written:
-            click.echo(f"nothing to write: {out} is what the register map says")
+            click.echo(f"nothing to write: {out} is up to date with the register map")
         return
     drifted = drifted_files(out)
     if drifted:
         names = ", ".join(str(path) for path in drifted)
-        raise StationError(f"not what the register map says: {names}; run `station plc docs`")
-    click.echo(f"{out} is what the register map says")
+        raise StationError(f"differs from the register map: {names}; run `station plc docs`")
+    click.echo(f"{out} is up to date with the register map")

@@ -78,7 +78,8 @@ class JournalFile:
             durable: wait for the disk, so that it outlives a loss of power too.
         """
         try:
-            # Without what is as it is at first: a version that does not know a field reads the journal all the same.
+            # Fields with their default value are left out: an older version, which refuses unknown fields, then still
+            # reads the journal.
             self._replace(journal.model_dump_json(exclude_defaults=True).encode(), durable=durable)
         except OSError as error:
             trouble = messages.JOURNAL_NOT_WRITTEN(file=str(self._path), error=str(error.strerror))

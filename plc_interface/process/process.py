@@ -60,7 +60,7 @@ async def serve(configuration: Configuration) -> None:
         tls = f", with TLS on port {modbus.tls.port}" if modbus.tls.enabled else ""
         log.info("Modbus TCP is served on %s, port %d%s, unit %d", modbus.host, modbus.port, tls, modbus.unit)
         await ended.wait()
-        log.info("told to end: the PLC reads offline, then its connection closes")
+        log.info("ending: the PLC reads offline, then its connection closes")
         interface.leave()
         await asyncio.sleep(GOODBYE_S)
     finally:

@@ -32,14 +32,20 @@ from station.messages.records import NEVER_BEGUN
 from station.settings.plc import HandshakeSettings
 
 OUTCOME_GRACE_S = 1.0
-"""So much longer than the interface's own deadline an outcome is waited for: what it would have been is logged."""
+"""How much longer than the interface's own deadline it waits for an outcome, so that a late one is logged.
+
+An estimate.
+"""
 _NOTE_TRIES = 3
 """A note that was refused may have been spoilt on its way; the station takes the same note again without effect."""
 _NOTE_AGAIN_S = 0.25
 _NOTE_LATER_S = 10.0
-"""Notes that were refused as often are repeated after so long each: the station's records cannot be written."""
+"""After `_NOTE_TRIES` refusals a note is repeated at this period: the station's records cannot be written.
+
+An estimate.
+"""
 _ASK_AGAIN_S = 2.0
-"""An outcome is asked for again after so long without an answer; the station answers every one who waits."""
+"""Without an answer for this time the outcome is requested again; the station answers every request. An estimate."""
 
 log = logging.getLogger(__name__)
 

@@ -192,7 +192,12 @@ class Group(NamedTuple):
     @property
     def words(self) -> int:
         """Number of its registers."""
-        return self.registers[-1].end - self.address
+        return self.end - self.address
+
+    @property
+    def end(self) -> int:
+        """The first address after its registers."""
+        return self.registers[-1].end
 
 
 GROUPS = (

@@ -18,7 +18,7 @@ def formatted_registers(value: Callable[[str], Value]) -> tuple[RegisterView, ..
             writable=register.access is Access.READ_WRITE,
             meaning=register.meaning,
         )
-        for register in sorted(REGISTERS, key=lambda each: each.address)
+        for register in REGISTERS
     )
 
 

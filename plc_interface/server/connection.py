@@ -10,9 +10,13 @@ from plc_interface.server.peer import Peer
 
 _BUFFER_BYTES = 4 * LONGEST_FRAME
 """Taken from the kernel at one time. What a client sends beyond it waits there, so that others have their turn."""
-REQUESTS_PER_S, AT_ONCE_S = 1000, 0.25
-"""Of one connection, and how much of it at once. A PLC needs a few for each scan. Without a limit who requests most
-takes the whole core, at real-time priority, and leaves no time to the station and its pages."""
+REQUESTS_PER_S = 1000
+"""Permitted rate of one connection; a PLC needs a few requests for each scan. An estimate.
+
+Without it the busiest client would take the whole core, at real-time priority, from the station and its pages.
+"""
+AT_ONCE_S = 0.25
+"""How much of that rate may come as one burst, s. An estimate."""
 
 
 class Connection(asyncio.BufferedProtocol):

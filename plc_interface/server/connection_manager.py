@@ -18,6 +18,7 @@ from station.settings.modbus import ModbusSettings
 RESERVED_PLACES = 4
 """Connections beyond the limit for the client that wrote last, or for one that may write and has no connection."""
 SWEEP_S = 0.1
+"""Period of the check for connections that have to end. An estimate."""
 
 log = logging.getLogger(__name__)
 

@@ -22,7 +22,8 @@ def _addresses(*, of: Access | None = None, kind: Kind | None = None) -> bytes:
 
 
 _LEFT_TO_THE_HANDSHAKE = frozenset({"lot", "command_code"})
-"""A PLC writes them in each scan, so a wrong one fails only the bit that uses it: a refused write has no heartbeat."""
+"""A PLC writes them in each scan. A wrong value fails only the bit that uses it, because refusing the whole write would
+also refuse the heartbeat."""
 _MAPPED, _WRITABLE, _FLAGS = _addresses(), _addresses(of=Access.READ_WRITE), _addresses(kind=Kind.BITS)
 
 

@@ -23,7 +23,7 @@ class LimitedLog:
         self._summed_up_s = float("-inf")
 
     def write(self, kind: str, now_s: float, level: int, message: str, *arguments: object) -> None:
-        """Write a line, or count it as omitted by the limit of its kind, in the plural for the summary."""
+        """Write a line, or count it as omitted. `kind` is a plural noun, for the summary."""
         if self._allowances[kind].take(now_s):
             self._log.log(level, message, *arguments)
         else:

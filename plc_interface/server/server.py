@@ -22,7 +22,8 @@ BACKLOG = 128
 """Connections that wait in the kernel to be taken."""
 
 UNTAKEN_BYTES = 64 * 1024
-"""Responses that the kernel keeps for a client that does not take them: soon it is seen, and a crowd costs little."""
+"""Send buffer of one connection, bytes: small, so that a client that does not read is noticed soon and many connections
+take little memory. An estimate."""
 
 
 class ModbusServerError(StationError):

@@ -19,6 +19,10 @@ from station.messages import can as messages
 from station.messages.message import Definition, Message
 from station.settings.can import ENCODER_EDS, GATE_EDS, CanSettings
 
+NODE_DEADLINE_S = 3.0
+"""Longest wait for a node's first heartbeat or a change of its state. An estimate."""
+POLL_S = 0.02
+"""Period of the checks while waiting. An estimate."""
 _BEHAVIOUR = 0xFFFF_0000
 """The upper half of a revision; the lower one never changes what a node does (CiA 301, object 1018)."""
 _ERROR_PART = 0xFFFF

@@ -14,9 +14,6 @@ from station.messages.message import Message
 from station.settings.can import CanSettings
 from station.settings.configuration import load_configuration
 
-_NODE_DEADLINE_S = 3.0
-_POLL_S = 0.02
-
 
 @click.command("check-can")
 @config_option
@@ -58,12 +55,12 @@ def _check_node(link: CanLink, node: bring_up.Node, settings: CanSettings) -> st
     Raises:
         LineIoError: no heartbeat, another device, or no answer.
     """
-    deadline_s = time.monotonic() + _NODE_DEADLINE_S
+    deadline_s = time.monotonic() + bring_up.NODE_DEADLINE_S
     while node.number not in link.beats:
         link.check()
         if time.monotonic() > deadline_s:
             raise BringUpError(bring_up.no_heartbeat(node, settings))
-        time.sleep(_POLL_S)
+        time.sleep(bring_up.POLL_S)
     identity = bring_up.verify_identity(node)
     is_gate = node.number == settings.gate_node
     foreign = bring_up.foreign_mapping(node, (bring_up.gate_pdos if is_gate else bring_up.encoder_pdos)(node, settings))

@@ -34,9 +34,9 @@ from station.messages.message import Message
 from station.settings.can import CanSettings
 
 _LONGEST_PAUSE_S = 10.0
-_POLL_S = 0.02
-_NODE_DEADLINE_S = 3.0
+"""Upper limit of the pause before the bus is brought up again, which doubles from `can.retry_s`. An estimate."""
 _LANES = 8
+"""Lanes of the gate, as in its data sheet."""
 _OPERATIONAL, _PRE_OPERATIONAL = 5, 127
 
 Result = TypeVar("Result")
@@ -193,7 +193,7 @@ class LineIo:
         passed_s: float | None = None
         while True:
             with suppress(TimeoutError):
-                async with asyncio.timeout(_POLL_S):
+                async with asyncio.timeout(bring_up.POLL_S):
                     return await pending.next()
             now_s, count = time.monotonic(), self.encoder_count()
             if passed_s is None and count is not None and ahead(count, at) <= 0:
@@ -226,7 +226,7 @@ class LineIo:
         while True:
             try:
                 while not self._healthy:
-                    await asyncio.sleep(_POLL_S)
+                    await asyncio.sleep(bring_up.POLL_S)
                 await self._session()
             except _HealthEndedError:
                 self._trouble, pause_s = None, self._settings.retry_s
@@ -313,14 +313,14 @@ class LineIo:
         return beat is not None and time.monotonic() - beat.at_s < self._settings.heartbeat_lost_s
 
     async def _until(self, link: CanLink, condition: Callable[[], bool], why: Message) -> None:
-        deadline_s = time.monotonic() + max(_NODE_DEADLINE_S, 3 * self._settings.heartbeat_lost_s)
+        deadline_s = time.monotonic() + max(bring_up.NODE_DEADLINE_S, 3 * self._settings.heartbeat_lost_s)
         while not condition():
             link.check()
             if not self._healthy:
                 raise _HealthEndedError(messages.UNHEALTHY())
             if time.monotonic() > deadline_s:
                 raise BringUpError(why)
-            await asyncio.sleep(_POLL_S)
+            await asyncio.sleep(bring_up.POLL_S)
 
     async def _watch(self, link: CanLink) -> None:
         while self._healthy:
@@ -330,9 +330,9 @@ class LineIo:
                     raise NodeLostError(messages.SILENT(node=self._name(node)))
                 state = link.beats[node].state
                 if state != _OPERATIONAL:
-                    told = STATES.get(state, str(state))
-                    raise NodeLostError(messages.STATE_CHANGED(node=self._name(node), state=told))
-            await asyncio.sleep(_POLL_S)
+                    state_name = STATES.get(state, str(state))
+                    raise NodeLostError(messages.STATE_CHANGED(node=self._name(node), state=state_name))
+            await asyncio.sleep(bring_up.POLL_S)
         raise _HealthEndedError(messages.UNHEALTHY())
 
     def _on_emergency(self, emergency: Emergency) -> None:

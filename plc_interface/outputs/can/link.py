@@ -21,15 +21,20 @@ from station.messages.message import Definition, Message
 from station.settings.can import CanSettings
 
 _RECEIVE_S = 0.1
+"""Longest wait for a frame; then the receiving thread checks whether it has to end. An estimate."""
 _JOIN_S = 5.0
+"""Longest wait for the end of the receiving thread. An estimate."""
 _MOST_FAILURES = 10
 """In a row; a single bad datagram must not close the bus."""
 _FAILURE_PAUSE_S = 0.02
+"""Pause after a failed reception. An estimate."""
 _BUS_OFF = 0x40
 """CAN_ERR_BUSOFF in an error frame's id (Linux, linux/can/error.h)."""
 _NO_CAN = {errno.EAFNOSUPPORT, errno.EPROTONOSUPPORT}
 HEARTBEAT = 0x700
+"""Identifier of a node's heartbeat, to which its node id is added (CiA 301)."""
 EMERGENCY = 0x80
+"""Identifier of a node's emergency message, to which its node id is added (CiA 301)."""
 _EMERGENCY = struct.Struct("<HB5x")
 COUNT = struct.Struct("<I")
 """The encoder's TPDO 1: position."""

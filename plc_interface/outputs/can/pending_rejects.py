@@ -20,7 +20,9 @@ from station.messages import can as messages
 from station.messages.message import Message
 
 _REMEMBERED = 64
+"""Number of ended orders whose further reports count as late, and not as those of another master. An estimate."""
 _KEPT_FAULTS = 8
+"""Maximum number of stored faults; the oldest is dropped. An estimate."""
 _WIRE = 0xFFFF
 
 
@@ -60,7 +62,7 @@ class DivertEcho(NamedTuple):
 
 
 class PendingReject:
-    """A pending reject."""
+    """One ordered reject actuation, with the gate's reports of it."""
 
     def __init__(self, order: Order, tolerance_counts: int) -> None:
         self.order = order

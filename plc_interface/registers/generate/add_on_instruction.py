@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from xml.etree import ElementTree as ET
 
 from plc_interface.registers.generate.st_source import Variable, parts
-from plc_interface.registers.generate.structured_text import ARRAYS, data_types, function_block
+from plc_interface.registers.generate.structured_text import ARRAYS, STRUCTURES, function_block, members
 from plc_interface.registers.generate.structures import document, logix_root
 
 NAME = "FB_FruitStation"
@@ -107,20 +107,20 @@ def _milliseconds(literal: str) -> int:
 
 def _data_types(types: ET.Element) -> None:
     """The structures; Logix keeps eight flags in a hidden byte."""
-    for name, rows in re.findall(r"TYPE (ST_\w+) :\nSTRUCT\n(.*?)\nEND_STRUCT;", data_types(), re.DOTALL):
+    for name, registers in STRUCTURES.items():
         made = ET.SubElement(types, "DataType", Name=name, Family="NoFamily", Class="User")
-        members, flags = ET.SubElement(made, "Members"), 0
-        for member, kind, comment in re.findall(r"^    (\w+) : (\w+); \(\* (.*) \*\)$", rows, re.MULTILINE):
+        listed, flags = ET.SubElement(made, "Members"), 0
+        for member, kind, comment in members(registers):
             row = {"Name": member, "DataType": "DINT", "Dimension": "0", "Radix": "Decimal", "Hidden": "false"}
             if kind == "BOOL":
                 host = f"ZZZZZZZZZZ{name[3:21]}{flags // 8}"
                 if flags % 8 == 0:
                     hidden = {"Name": host, "DataType": "SINT", "Hidden": "true", "ExternalAccess": "Read/Write"}
-                    ET.SubElement(members, "Member", {**row, **hidden})
+                    ET.SubElement(listed, "Member", {**row, **hidden})
                 row |= {"DataType": "BIT", "Target": host, "BitNumber": str(flags % 8)}
                 flags += 1
             ET.SubElement(
-                ET.SubElement(members, "Member", {**row, "ExternalAccess": "Read/Write"}), "Description"
+                ET.SubElement(listed, "Member", {**row, "ExternalAccess": "Read/Write"}), "Description"
             ).text = comment
 
 

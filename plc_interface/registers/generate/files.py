@@ -42,11 +42,11 @@ def write_files(folder: Path) -> list[Path]:
     """
     if folder == DOCUMENTS and not DOCUMENTS.parent.is_dir():
         raise BadInputError("this installation has no folder of documents: give a folder with --out")
-    drifted = drifted_files(folder)
+    contents, drifted = made_files(), drifted_files(folder)
     for path in drifted:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(made_files()[path.relative_to(folder).as_posix()], encoding="utf-8", newline="\n")
+            path.write_text(contents[path.relative_to(folder).as_posix()], encoding="utf-8", newline="\n")
         except OSError as error:
             message = f"{path} cannot be written ({error.strerror}): give a folder that may be written with --out"
             raise BadInputError(message) from error

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from plc_interface.registers.alarms import ALARMS
 from plc_interface.registers.generate.notices import MADE_BY
 from plc_interface.registers.map import GROUPS, MAP_VERSION, REGISTERS, bit_address, map_checksum
-from plc_interface.registers.register import Kind, Register
+from plc_interface.registers.register import Access, Kind, Register
 
 HOLDING, INPUT = 400_001, 300_001
 FULL = {Kind.U16: (0, 2**16 - 1), Kind.U32: (0, 2**32 - 1), Kind.U64: (0, 2**64 - 1)}
@@ -44,7 +44,7 @@ def markdown() -> str:
         "| block | PDU | words | in one request |",
         "|---|---|---|---|",
         *(
-            f"| {group.title} | {group.address} … {group.address + group.words - 1} | {group.words} | "
+            f"| {group.title} | {group.address} … {group.end - 1} | {group.words} | "
             f"{'write and read' if group.name == 'control' else 'read'} |"
             for group in GROUPS
         ),
@@ -79,7 +79,7 @@ def table() -> str:
                 INPUT + register.address,
                 register.kind.value,
                 register.words,
-                "RW" if register.access.value == "read and write" else "RO",
+                "RW" if register.access is Access.READ_WRITE else "RO",
                 register.unit,
                 "" if register.low is None else _plain(register.low),
                 "" if register.high is None else _plain(register.high),

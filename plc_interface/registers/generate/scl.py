@@ -8,7 +8,7 @@ import re
 
 from plc_interface.registers.generate.notices import MADE_BY, UNTESTED
 from plc_interface.registers.generate.st_source import Variable, parts
-from plc_interface.registers.generate.structured_text import ARRAYS, TEMPLATES, data_types, function_block
+from plc_interface.registers.generate.structured_text import ARRAYS, STRUCTURES, TEMPLATES, function_block, members
 from plc_interface.registers.map import GROUP_BY_NAME
 
 _WORDS = re.compile(r"\(\*.*?\*\)|[A-Za-z_][\w#]*(?:\.\w+)*|\d[\w#]*|.", re.DOTALL)
@@ -37,15 +37,13 @@ def s7_1500() -> str:
 
 
 def _types() -> list[str]:
-    structures = re.findall(r"TYPE (ST_\w+) :\nSTRUCT\n(.*?)\nEND_STRUCT;", data_types(), re.DOTALL)
-    return [
-        f'TYPE "{name}"\nVERSION : 0.1\n   STRUCT\n{_line_comments(rows)}\n   END_STRUCT;\nEND_TYPE\n'
-        for name, rows in structures
-    ]
-
-
-def _line_comments(rows: str) -> str:
-    return re.sub(r"^    (.*?;)(?: \(\* (.*) \*\))?$", r"      \1   // \2", rows, flags=re.MULTILINE)
+    types = []
+    for name, registers in STRUCTURES.items():
+        rows = [f"      {member} : {kind};   // {comment}" for member, kind, comment in members(registers)]
+        types.append(
+            "\n".join([f'TYPE "{name}"', "VERSION : 0.1", "   STRUCT", *rows, "   END_STRUCT;", "END_TYPE", ""])
+        )
+    return types
 
 
 def _declaration(variable: Variable) -> str:

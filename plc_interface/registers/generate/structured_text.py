@@ -16,11 +16,16 @@ STATUS, RESULT, CONTROL = GROUP_BY_NAME["status"], GROUP_BY_NAME["result"], GROU
 MORE_STATUS = GROUP_BY_NAME["more_status"]
 _NUMBERS = frozenset({Kind.U16, Kind.I16, Kind.U32, Kind.I32, Kind.BITS, Kind.BITS32})
 ARRAYS = {
-    "T_FruitStationRead": MORE_STATUS.address + MORE_STATUS.words - STATUS.address,
+    "T_FruitStationRead": MORE_STATUS.end - STATUS.address,
     "T_FruitStationWrite": CONTROL.words,
     "T_FruitStationLot": BY_NAME["lot"].words,
 }
 """Words of each array type; named, because two anonymous arrays are two types for a strict compiler."""
+STRUCTURES = {
+    "ST_FruitStationStatus": (*STATUS.registers, *MORE_STATUS.registers),
+    "ST_FruitStationResult": RESULT.registers,
+}
+"""Registers of each structure, whose `members` they give."""
 _PREFIXES = {"result_reasons": "reason_"}
 
 
@@ -64,8 +69,7 @@ TEMPLATES = Environment(
 def data_types() -> str:
     """The file with the data types of status and result, and of the words read and written."""
     parts = [_head("Data types")]
-    status = (*STATUS.registers, *MORE_STATUS.registers)
-    for registers, name in ((status, "ST_FruitStationStatus"), (RESULT.registers, "ST_FruitStationResult")):
+    for name, registers in STRUCTURES.items():
         rows = [f"    {member} : {kind}; (* {comment} *)" for member, kind, comment in members(registers)]
         parts.append("\n".join([f"TYPE {name} :", "STRUCT", *rows, "END_STRUCT;", "END_TYPE", ""]))
     for name, words in ARRAYS.items():
@@ -99,7 +103,7 @@ def _render(template: str, what: str) -> str:
     return TEMPLATES.get_template(template).render(
         head=_head(what),
         first=STATUS.address,
-        last=MORE_STATUS.address + MORE_STATUS.words - 1,
+        last=MORE_STATUS.end - 1,
         writes=CONTROL.words,
         lot_words=BY_NAME["lot"].words,
         control_bits=BY_NAME["control"].bits,

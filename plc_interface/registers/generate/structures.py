@@ -29,7 +29,7 @@ def studio_5000() -> str:
             _logix_member(listed, register.name, NAMES[register.kind].logix, dimension, _comment(register))
     whole = _logix_type(types, "FruitStation", "The fruit-inspection station's registers", Use="Target")
     for group in GROUPS:
-        about = f"Registers {group.address} to {group.address + group.words - 1}"
+        about = f"Registers {group.address} to {group.end - 1}"
         _logix_member(whole, group.name, f"FruitStation_{group.name}", 0, about)
     return document(root)
 
@@ -61,8 +61,7 @@ def codesys() -> str:
                 kind = ET.SubElement(array, _tag("baseType"))
             ET.SubElement(kind, _tag(NAMES[register.kind].iec))
             _documentation(variable, _comment(register))
-        _documentation(data_type, f"{group.title}: registers {group.address} to "
-                                  f"{group.address + group.words - 1}. {LOW_FIRST}")  # fmt: skip
+        _documentation(data_type, f"{group.title}: registers {group.address} to {group.end - 1}. {LOW_FIRST}")
     ET.SubElement(ET.SubElement(root, _tag("instances")), _tag("configurations"))
     return document(root)
 

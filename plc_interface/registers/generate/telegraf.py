@@ -21,9 +21,7 @@ def telegraf() -> str:
         '  timeout = "1s"',
         '  configuration_type = "request"',
     ]
-    for group in GROUPS:
-        if group.name == "control":
-            continue
+    for group in GROUPS[1:]:
         lines += [
             "",
             "  [[inputs.modbus.request]]",

@@ -19,7 +19,7 @@ def tia() -> str:
     for group in GROUPS:
         lines += [
             f'TYPE "FruitStation_{group.name}"',
-            f"TITLE = {group.title}: registers {group.address} to {group.address + group.words - 1}",
+            f"TITLE = {group.title}: registers {group.address} to {group.end - 1}",
             "VERSION : 0.1",
             "   STRUCT",
             *(f"      {row}" for register in group.registers for row in _rows(register)),

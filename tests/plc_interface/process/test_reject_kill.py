@@ -87,7 +87,7 @@ def test_a_reject_outlives_a_kill_at_each_write(monkeypatch, tmp_path, station, 
                 await until(lambda: SEQUENCE in station.published)
                 assert gate._due == {SEQUENCE: ENCODER + CAN.distance_counts}
                 orders = [order.get_name() for order in gate._rejects]
-                assert orders == [f"shot {SEQUENCE}"], "one order, however it came"
+                assert orders == [f"reject {SEQUENCE}"], "one order, however it came"
         finally:
             await station.die()
 
