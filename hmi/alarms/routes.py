@@ -97,7 +97,7 @@ async def shelve(
     reason: Annotated[str, Form(max_length=200)],
 ) -> Response:
     """Shelve an alarm for a time, with a reason."""
-    reason = {"being_mended": "it is being mended", "known": "known", "nuisance": "nuisance"}.get(reason, reason)
+    reason = "it is being mended" if reason == "being_mended" else reason
     request = ShelveAlarm(alarm=alarm, who=caller.name, role=caller.role, reason=reason, for_s=for_s)
     await _done(hmi.gateway, request)
     return go_to("/alarms")

@@ -1,6 +1,5 @@
 """`station api-token`: the tokens of the systems that use the HTTP API."""
 
-import getpass
 import re
 from datetime import UTC, datetime
 from pathlib import Path
@@ -10,6 +9,7 @@ import click
 from hmi.api.tokens import NAME, ROLES, ApiTokens
 from hmi.web.roles import Role
 from hmi.web.user_store import FOLDER
+from station.by_option import by_option
 from station.config_option import config_option
 from station.records.audit import AuditEntry, append_audit
 from station.records.database import records_folder
@@ -17,9 +17,6 @@ from station.records.direct_transaction import direct_transaction
 from station.settings.configuration import load_configuration
 
 _ROLE = "command line"
-_BY = click.option(
-    "--by", metavar="WHO", default=getpass.getuser, help="Who does it, for the audit trail. [default: your login]"
-)
 
 
 @click.group("api-token")
@@ -39,7 +36,7 @@ def api_token() -> None:
 @click.option(
     "--days", type=click.IntRange(1, 3650), metavar="N", help="Valid for so many days. [default: until it is removed]"
 )
-@_BY
+@by_option
 @config_option
 def add(name: str, role: str, days: int | None, by: str, config: Path | None) -> None:
     """Create a token for the system NAME and print it, this once. It is valid at once."""
@@ -65,7 +62,7 @@ def list_all(config: Path | None) -> None:
 
 @api_token.command()
 @click.argument("name")
-@_BY
+@by_option
 @config_option
 def remove(name: str, by: str, config: Path | None) -> None:
     """Withdraw the token of the system NAME; its next request is refused."""

@@ -32,7 +32,7 @@ Sentence = Annotated[str, BeforeValidator(lambda message: str(message or ""))]
 
 
 class ApiMessage(Model):
-    """What the station says, as data."""
+    """A message of the station, as data."""
 
     id: str = Field(description="Stays the same when the text is reworded.")
     parameters: dict[str, int | float | str | Message | tuple[Message, ...]] = Field(
@@ -46,7 +46,7 @@ class ApiMessage(Model):
         return cls(id=message.id, parameters=message.parameters, text=str(message))
 
 
-Said = Annotated[ApiMessage, BeforeValidator(ApiMessage.of)]
+MessageField = Annotated[ApiMessage, BeforeValidator(ApiMessage.of)]
 """From a message of the station's."""
 
 
@@ -65,8 +65,8 @@ class Part(Model):
     age_s: float | None = Field(description="Since it was last heard.")
     detail: Sentence = Field(description="The observation; empty where ok.")
     remedy: Sentence = Field(description="What to do; empty where ok.")
-    detail_message: Said | None = Field(validation_alias="detail")
-    remedy_message: Said | None = Field(validation_alias="remedy")
+    detail_message: MessageField | None = Field(validation_alias="detail")
+    remedy_message: MessageField | None = Field(validation_alias="remedy")
 
 
 class HealthAnswer(Model):
@@ -74,7 +74,7 @@ class HealthAnswer(Model):
 
     ready: bool = Field(description="A trigger would be accepted now.")
     why: Sentence = Field(description="Why not, with the remedy; empty where ready.")
-    why_message: Said | None = Field(validation_alias="why")
+    why_message: MessageField | None = Field(validation_alias="why")
     mode: int = Field(description="PackML: 1 production, 2 maintenance, 3 manual.")
     simulated: bool
     parts: list[Part]
@@ -90,10 +90,10 @@ class AlarmAnswer(Model):
     state: str
     active: bool = Field(description="Its cause is there, or it is latched, and it is not shelved.")
     since: Moment = Field(validation_alias="since_utc_ms")
-    cause: Said
-    consequence: Said
-    action: Said
-    detail: Said | None = Field(description="What was seen when it was last raised.")
+    cause: MessageField
+    consequence: MessageField
+    action: MessageField
+    detail: MessageField | None = Field(description="What was seen when it was last raised.")
 
 
 class AlarmAnswers(Model):

@@ -27,6 +27,7 @@ from hmi.api.model import (
 from hmi.past.past import UnknownInspectionError
 from hmi.past.recipes import RecipeState
 from hmi.web.access import HmiNow
+from hmi.web.gateway import SLOW_DEADLINE_S
 from hmi.web.roles import Right
 from station.channel.panel import Actor, AlarmList, ListAlarms
 from station.channel.panel_lots import EndLot, LotView, Search, StartLot
@@ -34,7 +35,6 @@ from station.channel.panel_maintenance import GetHealth, Health
 from station.vocabulary import OutcomeName, Reason
 
 IN_SCHEMA = True
-DEADLINE_S = 20.0
 _DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 _TEXT = {"text/plain": {"schema": {"type": "string"}}}
 _REFUSED: dict[int | str, dict[str, Any]] = {
@@ -73,7 +73,7 @@ Reader = Annotated[Actor, Depends(reader)]
 LotChanger = Annotated[Actor, Depends(changer(Right.RUN))]
 Text = Annotated[str, Query(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
 Moment = Annotated[datetime, BeforeValidator(_written_as_date)]
-"""A number is none, of which nobody says whether it counts seconds or milliseconds."""
+"""A number is refused: it does not state whether it counts seconds or milliseconds."""
 RecipeName = Annotated[str, Path(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
 Sequence = Annotated[int, Path(ge=1, lt=2**32)]
 EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo=UTC)
@@ -82,14 +82,14 @@ EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo
 @router.get("/health", tags=["health"])
 async def health(hmi: HmiNow, _: Reader) -> HealthAnswer:
     """Readiness of the station, and the state of each of its parts."""
-    reply = await hmi.gateway.request(GetHealth(), Health, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(GetHealth(), Health, deadline_s=SLOW_DEADLINE_S)
     return HealthAnswer.model_validate(reply)
 
 
 @router.get("/alarms", tags=["health"])
 async def alarms(hmi: HmiNow, _: Reader) -> AlarmAnswers:
     """Alarms that are not in their normal state."""
-    reply = await hmi.gateway.request(ListAlarms(), AlarmList, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(ListAlarms(), AlarmList, deadline_s=SLOW_DEADLINE_S)
     return AlarmAnswers.model_validate(reply)
 
 
@@ -134,7 +134,7 @@ async def inspection(hmi: HmiNow, _: Reader, sequence: Sequence) -> InspectionDe
 @router.get("/recipes", tags=["recipes"])
 async def recipes(hmi: HmiNow, _: Reader) -> RecipeList:
     """The state of every recipe."""
-    return RecipeList(recipes=[RecipeSummary(**_short(state)) for state in (await hmi.past.recipes.read()).states])
+    return RecipeList(recipes=[RecipeSummary(**_summary(state)) for state in (await hmi.past.recipes.read()).states])
 
 
 @router.get("/recipes/{name}", tags=["recipes"], responses=_NOT_FOUND)
@@ -144,7 +144,7 @@ async def recipe(hmi: HmiNow, _: Reader, name: RecipeName) -> RecipeDetails:
     if found is None:
         raise HTTPException(404, f"there is no recipe {name}; /api/v1/recipes lists them")
     values = found.control.recipe.model_dump(mode="json") if found.control else None
-    return RecipeDetails(**_short(found), values=values)
+    return RecipeDetails(**_summary(found), values=values)
 
 
 @router.get("/lots", tags=["lots"])
@@ -158,7 +158,7 @@ async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAn
     """One lot."""
     found = await hmi.past.lots(name=name)
     if not found:
-        raise HTTPException(404, f"nobody told of a lot {name}")
+        raise HTTPException(404, f"there is no lot {name}; /api/v1/lots lists the latest")
     return LotAnswer.model_validate(found[0])
 
 
@@ -166,19 +166,19 @@ async def lot(hmi: HmiNow, _: Reader, name: Annotated[LotName, Path()]) -> LotAn
 async def begin_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()], begin: LotBegin) -> LotAnswer:
     """Begin a lot, by the name that the PLC gives with each trigger. Idempotent."""
     query = StartLot(name=name, grower=begin.grower, actor=actor)
-    return LotAnswer.model_validate(await hmi.gateway.request(query, LotView, deadline_s=DEADLINE_S))
+    return LotAnswer.model_validate(await hmi.gateway.request(query, LotView, deadline_s=SLOW_DEADLINE_S))
 
 
 @router.post("/lots/{name:lot}/end", tags=["lots"], responses=_NOT_FOUND)
 async def end_lot(hmi: HmiNow, actor: LotChanger, name: Annotated[LotName, Path()]) -> LotAnswer:
     """End a lot. Idempotent."""
     if not await hmi.past.lots(name=name):
-        raise HTTPException(404, f"nobody told of a lot {name}; tell of its begin first")
+        raise HTTPException(404, f"there is no lot {name}; begin it first with PUT /api/v1/lots/NAME")
     query = EndLot(name=name, actor=actor)
-    return LotAnswer.model_validate(await hmi.gateway.request(query, LotView, deadline_s=DEADLINE_S))
+    return LotAnswer.model_validate(await hmi.gateway.request(query, LotView, deadline_s=SLOW_DEADLINE_S))
 
 
-def _short(state: RecipeState) -> dict[str, Any]:
+def _summary(state: RecipeState) -> dict[str, Any]:
     return {
         "name": state.name,
         "title": state.title,

@@ -5,7 +5,8 @@ import hmac
 import json
 import math
 import secrets
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -22,6 +23,8 @@ NAME = r"^[A-Za-z0-9][A-Za-z0-9 _.-]{0,39}$"
 ROLES = (Role.VIEWER, Role.OPERATOR)
 """A viewer's token reads; an operator's also begins and ends lots."""
 _DAY_MS = 86_400_000
+_COUNTED_S = 3600.0
+"""Period after which the count of refused tokens begins anew: the hour of its rows in the audit trail."""
 
 
 class Token(BaseModel):
@@ -128,3 +131,19 @@ class ApiTokens:
         except OSError as error:
             raise StationError(f"{self._path} cannot be written: {error.strerror}; make its folder writable") from error
         self._tokens, self._seen = tokens, None
+
+
+class RefusedTokens:
+    """Count of refused tokens: only the first, tenth, hundredth … of an hour get into the audit trail, to spare it."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._began_s = -math.inf
+        self._number = 0
+
+    def count(self) -> int | None:
+        """Count one, and return the number of the hour if a row is due."""
+        if self._clock() - self._began_s > _COUNTED_S:
+            self._began_s, self._number = self._clock(), 0
+        self._number += 1
+        return self._number if str(self._number).rstrip("0") == "1" else None

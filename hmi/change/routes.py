@@ -1,6 +1,5 @@
 """Change fruit page: select, review the differences, confirm, and follow the change between fruits."""
 
-import json
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
@@ -9,7 +8,7 @@ from starlette.responses import Response
 
 from hmi.web.access import HmiNow, LocaleNow, orders
 from hmi.web.context import Hmi
-from hmi.web.gateway import Gateway, actor_of
+from hmi.web.gateway import ORDER_DEADLINE_S, Gateway, actor_of
 from hmi.web.live import Part, of_state
 from hmi.web.navigation import Entry
 from hmi.web.page import go_to, show, show_part
@@ -29,7 +28,6 @@ from station.settings.recipe import Recipe
 
 router = APIRouter()
 ENTRY = Entry("change", "/change")
-ORDER_DEADLINE_S = 5.0
 
 
 class Change(NamedTuple):
@@ -128,8 +126,8 @@ def changes(now: RecipeSummary | None, then: RecipeSummary, locale: Locale) -> l
 
 def _values(shown: RecipeSummary, w: Locale) -> dict[str, str]:
     try:
-        recipe = Recipe.model_validate_json(json.dumps(json.loads(shown.values)))
-    except ValueError:  # of another form of the program
+        recipe = Recipe.model_validate_json(shown.values)
+    except ValueError:  # of a schema version that this program does not accept
         return {"revision": shown.revision}
     width, steps, damage = recipe.expected_width, recipe.steps, recipe.damage
     limits = ", ".join(f"{w.number(a.area_mm2)} mm² ({w.number(a.closing_mm, 1)} mm)" for a in damage.area)

@@ -1,15 +1,18 @@
-// Parts of pages that are asked for again and again, never faster than they are taken; and a recipe's chart as it is typed.
+// Polled parts, requested again only after the last answer is shown; and the recipe chart, redrawn while a person types.
 "use strict";
 
 (() => {
   const AFTER_FAULT_MS = 1500;
-  const PATIENCE_MS = 15000;
-  const TYPED_MS = 300;
-  const LOOK_MS = 250;
+  // Longest wait for an answer; a part is requested again later. An estimate.
+  const FETCH_TIMEOUT_MS = 15000;
+  // Pause in typing after which the chart is redrawn. An estimate.
+  const DEBOUNCE_MS = 300;
+  // Period of the check of a part's age. An estimate.
+  const AGE_CHECK_MS = 250;
 
   async function fetched(address) {
     const ended = new AbortController();
-    const timer = setTimeout(() => ended.abort(), PATIENCE_MS);
+    const timer = setTimeout(() => ended.abort(), FETCH_TIMEOUT_MS);
     try {
       const answer = await fetch(address, { signal: ended.signal, credentials: "same-origin" });
       if (!answer.ok) {
@@ -27,7 +30,7 @@
       [...part.querySelectorAll("img:not([loading])")].map((image) => (image.decode ? image.decode().catch(() => 0) : 0)),
     );
 
-  // As for what is sent: older than two seconds, whatever failed, and it is greyed, untouchable and says how old it is.
+  // As for live parts: a part whose data is older than two seconds, for whatever reason, is greyed, inert, and shows its age.
   function aging(part) {
     let takenAt = performance.now();
     const look = () => {
@@ -41,7 +44,7 @@
         delete part.dataset.old;
       }
     };
-    const timer = setInterval(look, LOOK_MS);
+    const timer = setInterval(look, AGE_CHECK_MS);
     return {
       renewed: () => {
         takenAt = performance.now();
@@ -86,7 +89,7 @@
             }
           }
         }
-        // A finger on the part keeps what came out of it: what is shown then ages.
+        // A pressed part keeps its content, which then ages.
         if (filled === html) {
           age.renewed();
         }
@@ -123,7 +126,7 @@
         } catch {
           here.classList.add("old-part");
         }
-      }, TYPED_MS);
+      }, DEBOUNCE_MS);
     });
   }
 

@@ -38,7 +38,7 @@
     if (board.dataset[name]) {
       button.setAttribute("aria-label", board.dataset[name]);
     }
-    // The field keeps the focus: a key is no place to be.
+    // Keep the focus in the field; a key must not take it.
     button.addEventListener("pointerdown", (event) => event.preventDefault());
     button.addEventListener("click", press);
     return button;

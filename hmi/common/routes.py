@@ -50,7 +50,7 @@ PARTS = {
 async def live(
     request: Request, hmi: HmiNow, locale: LocaleNow, part: Annotated[list[str], Query(max_length=MOST_PARTS)]
 ) -> Response:
-    """Send server-sent events with a page's parts; see `hmi.live`."""
+    """Send server-sent events with a page's parts; see `hmi.web.live`."""
     if hmi.live.unknown(part):
         raise Problem(404, "problem.not_found")
     caller = caller_of(request)

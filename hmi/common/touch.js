@@ -3,8 +3,11 @@
 
 (() => {
   const HOLD_MS = 1000;
+  // Time for the second press of a button that is not held. An estimate.
   const AGAIN_MS = 5000;
+  // Least time between two reports that the person is here. An estimate.
   const HERE_MS = 5000;
+  // Longest wait for the pages' process before an order is sent. An estimate.
   const REACH_MS = 2000;
   const reached = new WeakSet();
   let toldHere = 0;
@@ -123,7 +126,8 @@
   const wire = (root) => root.querySelectorAll("[data-hold]").forEach(holdable);
   wire(document);
   document.addEventListener("renewed", (event) => wire(event.target));
-  // By a wheel too, who reads on; not by "scroll", which a page that renews itself causes as well.
+  // A wheel counts as a touch, because a person who reads uses it. "scroll" does not: a page that renews itself causes it
+  // too.
   for (const name of ["pointerdown", "keydown", "wheel"]) {
     document.addEventListener(name, here, { passive: true });
   }

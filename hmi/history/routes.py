@@ -17,7 +17,7 @@ from hmi.history.export_options import check_text, options_of
 from hmi.past.past import FullRecord, Page, Stages, judged_of
 from hmi.web.access import GenuineCaller, HmiNow, LocaleNow, caller_of, known
 from hmi.web.context import Hmi
-from hmi.web.gateway import actor_of
+from hmi.web.gateway import SLOW_DEADLINE_S, actor_of
 from hmi.web.navigation import Entry
 from hmi.web.page import go_to, show
 from hmi.web.problem import Problem
@@ -31,11 +31,13 @@ from station.vocabulary import Reason
 
 router = APIRouter(prefix="/history")
 ENTRY = Entry("history", "/history")
-DEADLINE_S = 20.0
 PAGE = 20
 _AUDIT_PAGE = 100
 _OUTCOMES = {"PASS": "pass", "FAIL": "fail", "NO_RESULT": "unjudged"}
 _LONGEST_GAP = 50
+"""Numbers that are searched for the next fruit. An estimate."""
+_LARGEST_STEP = 1000
+"""Upper limit of a step's number in an address; a recipe has at most 100 steps."""
 _KEPT_STAGES = 3
 _BETWEEN_DIGITS = str.maketrans("", "", " ,.'\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{THIN SPACE}")
 """Separators of a number such as 4,711."""
@@ -126,7 +128,7 @@ async def export(
     if wanted is None:
         raise Problem(400, "problem.bad_form")
     actor, options, folder = actor_of(known(caller)), options_of(wanted), hmi.jobs.folder()
-    await hmi.gateway.request(NoteExport(search=wanted, actor=actor), Noted, deadline_s=DEADLINE_S)
+    await hmi.gateway.request(NoteExport(search=wanted, actor=actor), Noted, deadline_s=SLOW_DEADLINE_S)
     job = hmi.jobs.begin("export", folder, ["records", "export", str(folder / f"inspections.{form}"), *options])
     return go_to(f"/jobs/{job.id}?back=/history")
 
@@ -225,7 +227,7 @@ async def _stages(hmi: Hmi, sequence: int, step: int) -> Stages:
     known = _STAGES.get((sequence, step))
     if known is not None:
         return known
-    if not (0 < sequence < 2**32 and 0 <= step <= 1000):
+    if not (0 < sequence < 2**32 and 0 <= step <= _LARGEST_STEP):
         raise Problem(404, "problem.not_found")
     reply = await hmi.past.stages(sequence, step)
     _STAGES[sequence, step] = reply
@@ -275,7 +277,7 @@ def _limits(reply: FullRecord) -> tuple[list[Limit], float | None]:
             for each in recipe["damage"]["area"]
         ]
         return limits, factor * recipe["early_stop"]["area_mm2"]
-    except (KeyError, TypeError):  # of a form that this program does not know
+    except (KeyError, TypeError):  # of a schema version that this program does not accept
         return [], None
 
 

@@ -25,11 +25,14 @@ from station.messages.message import Message, verbatim
 
 FOLDER = "panel_jobs"
 LONGEST_S = 1800.0
+"""Time limit of a job. An estimate."""
 STORED_JOBS = 8
 """Number of the newest jobs whose files are stored."""
 MOST_WAITING = 4
+"""Maximum number of jobs that are waiting or running. An estimate."""
 _STOP_S = 5.0
 _LEAST_FREE_BYTES = 64 * 1024 * 1024
+"""Free space of the disk below which no job begins. An estimate."""
 _PROGRESS = "replayed.jsonl"
 _CONFIGURATION = "job.station.yaml"
 """A job's own; no recipe's name has a dot."""

@@ -17,7 +17,7 @@ from hmi.common.commands import shown_command
 from hmi.maintenance.histogram import histogram
 from hmi.web.access import HmiNow, LocaleNow, may, orders
 from hmi.web.context import Hmi
-from hmi.web.gateway import Gateway, actor_of
+from hmi.web.gateway import SLOW_DEADLINE_S, STALE_S, Gateway, actor_of
 from hmi.web.live import Part, of_state
 from hmi.web.navigation import Entry
 from hmi.web.page import go_to, show, show_part
@@ -59,11 +59,16 @@ from station.channel.panel_run import (
 
 router = APIRouter(prefix="/maintenance")
 ENTRY = Entry("maintenance", "/maintenance")
-DEADLINE_S = 20.0
 MOVE_DEADLINE_S = 30.0
+"""For a request that waits for a movement. An estimate."""
 MODE_S = 5.0
+"""How long the page waits for the end of a change of the mode. An estimate."""
 JOG_STEP_MM = 1.0
 LOG_LINES = 50
+_IMAGE_DEADLINE_S = 5.0
+"""For a live image with its contact. An estimate."""
+_FRAMES: OrderedDict[str, ImageFile] = OrderedDict()
+"""The last live images: a page gets the address of one, and then fetches it."""
 _KEPT_FRAMES = 8
 _PLACE = re.compile(r"^\s*(-?\d+(?:[.,]\d+)?)\s*[; ]\s*(-?\d+(?:[.,]\d+)?)\s*$")
 
@@ -146,7 +151,7 @@ async def mode(
 ) -> Response:
     """Set manual mode, in which no fruit is accepted, or production again."""
     query = OperatorCommand(person=actor_of(caller), order=OperatorCommandName.SET_MODE, argument=mode)
-    command = await hmi.gateway.request(query, OperatorCommandView, deadline_s=DEADLINE_S)
+    command = await hmi.gateway.request(query, OperatorCommandView, deadline_s=SLOW_DEADLINE_S)
     ended, until_s = None, time.monotonic() + MODE_S
     while ended is None and command.state != "failed" and time.monotonic() < until_s:
         await asyncio.sleep(0.1)
@@ -184,7 +189,7 @@ async def jog(
 async def leds(hmi: HmiNow, caller: Maintainer, red: Brightness, green: Brightness, blue: Brightness) -> Response:
     """Set the sensor's light."""
     query = SetLeds(red=red, green=green, blue=blue, actor=actor_of(caller))
-    await hmi.gateway.request(query, LedsSet, deadline_s=DEADLINE_S)
+    await hmi.gateway.request(query, LedsSet, deadline_s=SLOW_DEADLINE_S)
     return go_to("/maintenance/hand?lit=yes")
 
 
@@ -231,7 +236,7 @@ async def sensor_picture(
     name: Literal["area.png", "field.png"],
 ) -> Response:
     """Send a plot of the calibration in force."""
-    reply = await hmi.gateway.request(GetCalibration(), CalibrationState, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(GetCalibration(), CalibrationState, deadline_s=SLOW_DEADLINE_S)
     record = reply.calibration if kind == "calibration" else reply.verification
     if record is None or name not in record.pictures:
         raise Problem(404, "problem.not_found")
@@ -251,14 +256,16 @@ async def begin(
         raise Problem(400, "problem.bad_form")
     wanted = tuple((_mm(each[1]), _mm(each[2])) for each in parsed if each)
     query = StartCalibrationRun(kind=kind, places=wanted, actor=actor_of(caller))
-    await hmi.gateway.request(query, CalibrationRunView, deadline_s=DEADLINE_S)
+    await hmi.gateway.request(query, CalibrationRunView, deadline_s=SLOW_DEADLINE_S)
     return go_to("/maintenance/sensor")
 
 
 @router.post("/sensor/go-on")
 async def go_on(hmi: HmiNow, caller: Maintainer) -> Response:
     """Confirm that the ball is in place."""
-    await hmi.gateway.request(ContinueCalibrationRun(actor=actor_of(caller)), CalibrationRunView, deadline_s=DEADLINE_S)
+    await hmi.gateway.request(
+        ContinueCalibrationRun(actor=actor_of(caller)), CalibrationRunView, deadline_s=SLOW_DEADLINE_S
+    )
     return go_to("/maintenance/sensor")
 
 
@@ -284,14 +291,8 @@ async def registers_part(hmi: HmiNow, locale: LocaleNow) -> Response:
 @router.get("/log")
 async def log(request: Request, hmi: HmiNow, level: Annotated[Level, Query()] = "INFO") -> Response:
     """Show the last lines of the station's log."""
-    reply = await hmi.gateway.request(ReadLog(limit=LOG_LINES, level=level), Log, deadline_s=DEADLINE_S)
+    reply = await hmi.gateway.request(ReadLog(limit=LOG_LINES, level=level), Log, deadline_s=SLOW_DEADLINE_S)
     return show(request, "maintenance_log.html.j2", tab="log", lines=reply.lines[::-1], level=level)
-
-
-_OLD_IMAGE_S = 2.0
-"""An image is shown as live up to this age, as are all values of the pages."""
-_FRAMES: OrderedDict[str, ImageFile] = OrderedDict()
-"""The last live images: a page gets the address of one, and then fetches it."""
 
 
 def _ended(hmi: Hmi, ticket: int) -> OperatorCommandView | None:
@@ -301,7 +302,7 @@ def _ended(hmi: Hmi, ticket: int) -> OperatorCommandView | None:
 
 
 async def _health(hmi: Hmi) -> dict[str, Any]:
-    return {"health": await hmi.gateway.request(GetHealth(), Health, deadline_s=DEADLINE_S)}
+    return {"health": await hmi.gateway.request(GetHealth(), Health, deadline_s=SLOW_DEADLINE_S)}
 
 
 def _allowed(values: dict[str, Any]) -> str:
@@ -318,7 +319,7 @@ async def _stepped(hmi: Hmi, step_mm: float) -> float:
 
 async def _live(hmi: Hmi, *, contact: bool) -> dict[str, Any]:
     try:
-        reply = await hmi.gateway.request(GetLiveImage(contact=contact), LiveImage, deadline_s=5.0)
+        reply = await hmi.gateway.request(GetLiveImage(contact=contact), LiveImage, deadline_s=_IMAGE_DEADLINE_S)
     except ChannelError as error:
         return {"live_image": None, "why": error.message, "histograms": (), "place": ""}
     place = str(round(1e6 * reply.captured_s)) + ("1" if contact else "0")
@@ -326,20 +327,20 @@ async def _live(hmi: Hmi, *, contact: bool) -> dict[str, Any]:
     while len(_FRAMES) > _KEPT_FRAMES:
         _FRAMES.popitem(last=False)
     drawn = tuple(zip(("red", "green", "blue"), map(histogram, reply.histogram), strict=True))
-    is_old = reply.age_s > _OLD_IMAGE_S
+    is_old = reply.age_s > STALE_S
     return {"live_image": reply, "why": "", "histograms": drawn, "place": place, "is_old": is_old}
 
 
 async def _calibration(hmi: Hmi) -> dict[str, Any]:
     recipes = await hmi.gateway.request(GetRecipes(), Recipes)
     return {
-        "now": await hmi.gateway.request(GetCalibration(), CalibrationState, deadline_s=DEADLINE_S),
+        "now": await hmi.gateway.request(GetCalibration(), CalibrationState, deadline_s=SLOW_DEADLINE_S),
         "ball": next((each for each in recipes.recipes if each.name == hmi.ball_recipe), None),
     }
 
 
 async def _registers(hmi: Hmi) -> Registers:
-    return await hmi.gateway.request(GetRegisters(), Registers, deadline_s=DEADLINE_S)
+    return await hmi.gateway.request(GetRegisters(), Registers, deadline_s=SLOW_DEADLINE_S)
 
 
 def _mm(text: str) -> float:

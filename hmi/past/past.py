@@ -23,11 +23,11 @@ from station.inspection.alarm_table import ALARMS
 from station.messages.message import Message, message_in, verbatim
 from station.records.audit import AuditRow
 from station.records.audit_report import read_audit
-from station.records.database import reading
+from station.records.database import reading, records_folder
 from station.records.errors import RecordsError, UnknownInspectionError
 from station.records.lots import read_lots
 from station.records.model import AlarmEntry, FullRecord, InspectionRecord
-from station.records.queries import Summary, read_alarm_log, read_inspection
+from station.records.queries import read_alarm_log, read_inspection
 from station.records.search import Page, Query, find_page
 from station.settings.configuration import Configuration
 from station.settings.recipe_model import Recipe
@@ -44,7 +44,6 @@ __all__ = [
     "Past",
     "RecordsError",
     "Stages",
-    "Summary",
     "Tried",
     "UnknownInspectionError",
     "judged_of",
@@ -72,7 +71,8 @@ class Past:
     """
 
     def __init__(self, site: Configuration, broken: str) -> None:
-        self._site, self._broken, self._folder, self._worker = site, broken, site.home / "records", PastWorker()
+        self._site, self._broken, self._folder = site, broken, records_folder(site.home)
+        self._worker = PastWorker()
         self.recipes = PastRecipes(site.home, site.recipes_folder, self._worker)
 
     def __enter__(self) -> Self:

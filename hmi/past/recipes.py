@@ -133,7 +133,7 @@ def changes_of(old: Recipe, new: Recipe) -> tuple[Difference, ...]:
 def _changes_since(before: Revision | None, revision: Revision) -> tuple[Difference, ...]:
     try:
         return () if before is None else changes_of(before.recipe, revision.recipe)
-    except SettingsError:  # of a form that this program does not take any more
+    except SettingsError:  # of a schema version that this program does not accept
         return ()
 
 

@@ -74,5 +74,5 @@ def read_tried(folder: Path, draft: Recipe) -> Tried | None:
         return None
     own = {sha256: recipe_of_snapshot(text) for sha256, text in texts.items()}
     results = [replay(each, own[each.recipe_sha256], draft) for each in stored if each.recipe_sha256 in own]
-    told = counted(each for each in results if each.sequence in last)
-    return Tried(len(last), told.decided, told.rejects_before(), told.rejects_after(), compared(results, marks))
+    counts = counted(each for each in results if each.sequence in last)
+    return Tried(len(last), counts.decided, counts.rejects_before(), counts.rejects_after(), compared(results, marks))

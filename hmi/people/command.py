@@ -1,6 +1,5 @@
 """`station administrator`: the first person who may log in, where the station has no screen of its own."""
 
-import getpass
 from pathlib import Path
 
 import click
@@ -8,6 +7,7 @@ import click
 from hmi.web.roles import Role
 from hmi.web.text import texts
 from hmi.web.user_store import FOLDER, UserStore, UserStoreError
+from station.by_option import by_option
 from station.config_option import config_option
 from station.errors import BadInputError
 from station.records.audit import AuditEntry, append_audit
@@ -18,9 +18,7 @@ from station.settings.configuration import load_configuration
 
 @click.command()
 @click.argument("name")
-@click.option(
-    "--by", metavar="WHO", default=getpass.getuser, help="Who does it, for the audit trail. [default: your login]"
-)
+@by_option
 @config_option
 def administrator(name: str, by: str, config: Path | None) -> None:
     """Make NAME the first person who may log in, and ask for the PIN.

@@ -17,7 +17,7 @@ from hmi.recipes.form import BadFieldError, changed, formatted, groups, with_cha
 from hmi.recipes.strip import strip
 from hmi.web.access import HmiNow, LocaleNow, caller_of, orders
 from hmi.web.context import Hmi
-from hmi.web.gateway import actor_of
+from hmi.web.gateway import SLOW_DEADLINE_S, actor_of
 from hmi.web.navigation import Entry
 from hmi.web.page import go_to, show, show_part
 from hmi.web.problem import Problem
@@ -45,7 +45,6 @@ from station.settings.recipe_versions import content_sha256
 
 router = APIRouter(prefix="/recipes")
 ENTRY = Entry("recipes", "/recipes")
-DEADLINE_S = 20.0
 _OFTEN = re.compile(r"damage\.area\[\d+\]|damage|early_stop|expected_width")
 """Groups of values that are changed often; the others are folded."""
 _SLIDES = re.compile(r"damage\.area\[\d+\]\.area_mm2")
@@ -118,7 +117,7 @@ async def save(
         return await _form(request, hmi, locale, name, typed, base, locale.text("recipes.nothing_changed"), reason)
     try:
         query = SaveDraft(name=name, values=changes, base=base, reason=reason, actor=actor_of(caller))
-        await hmi.gateway.request(query, Noted, deadline_s=DEADLINE_S)
+        await hmi.gateway.request(query, Noted, deadline_s=SLOW_DEADLINE_S)
     except RefusedError as error:
         return await _form(request, hmi, locale, name, typed, base, error.message, reason)
     return go_to(f"/recipes/{name}")
@@ -196,7 +195,7 @@ async def import_file(hmi: HmiNow, caller: Editor, reason: Reason, file: Annotat
     if not text or len(text) > LARGEST_TEXT:
         raise Problem(400, "problem.bad_form")
     order = ImportRecipe(text=text, reason=reason, actor=actor_of(caller))
-    imported = await hmi.gateway.request(order, ImportedRecipe, deadline_s=DEADLINE_S)
+    imported = await hmi.gateway.request(order, ImportedRecipe, deadline_s=SLOW_DEADLINE_S)
     return go_to(f"/recipes/{imported.name}")
 
 
@@ -211,7 +210,7 @@ async def whatif(hmi: HmiNow, name: Name, last: Annotated[int, Form(ge=1, le=100
 
 
 async def _order(hmi: Hmi, order: RecipeOrder) -> Response:
-    await hmi.gateway.request(order, Noted, deadline_s=DEADLINE_S)
+    await hmi.gateway.request(order, Noted, deadline_s=SLOW_DEADLINE_S)
     return go_to(f"/recipes/{order.name}")
 
 

@@ -14,7 +14,7 @@ from hmi.common.charts import deciding_limit
 from hmi.common.commands import shown_command
 from hmi.run import charts
 from hmi.web.access import HmiNow, LocaleNow, orders
-from hmi.web.gateway import Gateway, actor_of
+from hmi.web.gateway import ORDER_DEADLINE_S, Gateway, actor_of
 from hmi.web.live import Part, of_state
 from hmi.web.navigation import Entry
 from hmi.web.page import go_to, show
@@ -41,7 +41,6 @@ ENTRY = Entry("run", "/")
 MOST_RECENT = 10
 _TAKT_OF = 20
 """So many fruit's intervals, of which the median is no pause of the line."""
-ORDER_DEADLINE_S = 5.0
 _MOST_REASONS = 3
 _LEAST_INTERVALS = 3
 _ORDERS = frozenset(
@@ -162,6 +161,7 @@ async def picture(hmi: HmiNow, sequence: Sequence) -> Response:
     are removed.
     """
     found = await hmi.gateway.request(GetPicture(sequence=sequence), Picture)
+    # The text is inserted into the SVG: anything but base64 is refused here.
     base64.b64decode(found.jpeg, validate=True)
     corners = " ".join(f"{x},{y}" for x, y in found.outline)
     size = f'width="{found.width_px}" height="{found.height_px}"'

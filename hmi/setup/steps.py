@@ -26,7 +26,7 @@ class Step(NamedTuple):
     """`next` is the first that can be done now, `open` are the others."""
     waits_for: tuple[str, ...]
     """Steps to do before; empty unless blocked."""
-    says: Message | None
+    message: Message | None
     """The station's own message and remedy while it is not done, or what it knows of it."""
 
 
@@ -41,9 +41,9 @@ def steps(state: PanelState, recent: Recent) -> tuple[Step, ...]:
             name,
             "done" if done else "blocked" if waiting[name] else "next" if name == first_open else "open",
             waiting.get(name, ()),
-            says,
+            message,
         )
-        for name, done, says in found
+        for name, done, message in found
     )
 
 

@@ -14,6 +14,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Match, Route
 
 from hmi.api.model import ApiMessage, Error
+from hmi.api.tokens import ApiTokens, RefusedTokens
 from hmi.jobs.queue import Jobs
 from hmi.past.past import PanelBusyError, Past, RecordsError
 from hmi.past.worker import HOLDER
@@ -65,6 +66,8 @@ def make_context(site: Configuration, file: Path | None, broken: str) -> Hmi:
         sessions=Sessions(settings.idle_s),
         people=UserStore(site.home / FOLDER),
         pins=LoginRateLimiter(),
+        tokens=ApiTokens(site.home / FOLDER),
+        refused_tokens=RefusedTokens(),
         assets=assets,
         renderer=renderer,
         live=Live(parts(), renderer, gateway, boot, Places(MOST_STREAMS, settings.pages_per_address, RESERVED_STREAMS)),
@@ -174,6 +177,6 @@ async def _broken(request: Request, _: Exception) -> Response:
 
 def _problem_answer(request: Request, status: int, text: str, detail: Message | None = None) -> Response:
     if request.url.path.startswith("/api/"):
-        told = Error(detail=f"{text} {detail or ''}".strip(), message=detail and ApiMessage.of(detail))
-        return JSONResponse(told.model_dump(mode="json", exclude_none=True), status)
+        body = Error(detail=f"{text} {detail or ''}".strip(), message=detail and ApiMessage.of(detail))
+        return JSONResponse(body.model_dump(mode="json", exclude_none=True), status)
     return show(request, "problem.html.j2", status=status, text=text, detail=detail)

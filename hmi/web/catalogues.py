@@ -125,9 +125,7 @@ def _wrong(english: Forms | None, entry: Message | None) -> str:
     if entry.fuzzy:
         return "its English was changed: review the translation, and remove `fuzzy`"
     allowed, needed = fields("".join(english)), fields(english[-1])
-    if len(forms) == 1 and fields(forms[0]) != needed:
-        return f"has other braces than {sorted(needed)}"
-    if not all(fields(form) <= allowed for form in forms) or (len(forms) > 1 and fields(forms[-1]) != needed):
+    if fields(forms[-1]) != needed or not all(fields(form) <= allowed for form in forms):
         return f"has other braces than {sorted(needed)}"
     return ""
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from hmi.api.tokens import ApiTokens, RefusedTokens
 from hmi.jobs.queue import Jobs
 from hmi.past.past import Past
 from hmi.web.assets import Assets
@@ -26,6 +27,8 @@ class Hmi:
     sessions: Sessions
     people: UserStore
     pins: LoginRateLimiter
+    tokens: ApiTokens
+    refused_tokens: RefusedTokens
     assets: Assets
     renderer: Renderer
     live: Live

@@ -21,6 +21,11 @@ ReplyT = TypeVar("ReplyT", bound=ChannelMessage)
 STALE_S = 2.0
 """An older state is not shown as live."""
 DEADLINE_S = 2.0
+"""For a request that the station answers from memory. An estimate."""
+SLOW_DEADLINE_S = 20.0
+"""For a request that waits for a device or the disk. An estimate."""
+ORDER_DEADLINE_S = 5.0
+"""For the station to take an operator's command; its end is shown later. An estimate."""
 _POLL_DEADLINE_S = 1.0
 UNNAMED_BURST, UNNAMED_REFILL_S = 30, 60.0
 """Audit rows that anybody can cause without a log-in: at once, and time for one more."""

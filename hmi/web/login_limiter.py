@@ -7,9 +7,13 @@ from collections.abc import Callable
 from station.serving.guard import is_this_machines
 
 FREE_TRIES = 4
+"""Wrong PINs in a row without a delay. An estimate."""
 FIRST_WAIT_S = 5.0
+"""Delay after one more wrong PIN; each further one doubles it. An estimate."""
 LONGEST_WAIT_S = 900.0
+"""Upper limit of the delay. An estimate."""
 CLEARED_AFTER_S = 3600.0
+"""Time since the last wrong PIN after which the count begins anew. An estimate."""
 _MOST_KEYS = 1000
 
 

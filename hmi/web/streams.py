@@ -1,4 +1,4 @@
-"""Places of the event streams: for one address or person so many; a new page takes the place of the oldest."""
+"""Event stream of one page, as a holder of a place; see `station.serving.places`."""
 
 import asyncio
 import time

@@ -6,6 +6,7 @@ from typing import TypeVar
 
 import click
 
+from station.by_option import by_option
 from station.channel.client import ChannelClient
 from station.channel.line import CommandDone
 from station.channel.messages import ChannelMessage, DeadlineError
@@ -18,7 +19,6 @@ from station.channel.panel import (
     UnshelveAlarm,
 )
 from station.clock import formatted
-from station.commands.records_options import by_option
 from station.commands.site import site_or_last_good
 from station.config_option import config_option
 from station.errors import StationError

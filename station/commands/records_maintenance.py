@@ -5,9 +5,10 @@ from pathlib import Path
 import click
 from sqlalchemy import Connection, exists, select
 
+from station.by_option import by_option
 from station.channel.panel_lots import LotView
 from station.clock import formatted
-from station.commands.records_options import by_option, folder_of, proof_options, public_keys_option
+from station.commands.records_options import folder_of, proof_options, public_keys_option
 from station.commands.site import site_or_last_good
 from station.config_option import config_option
 from station.errors import StationError

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import click
 
+from station.by_option import by_option
 from station.clock import formatted
-from station.commands.records_options import by_option, folder_of
+from station.commands.records_options import folder_of
 from station.config_option import config_option
 from station.records.audit import AuditEntry, append_audit
 from station.records.database import reading

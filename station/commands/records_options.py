@@ -1,6 +1,5 @@
 """Options shared by commands of `station records`."""
 
-import getpass
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -93,13 +92,6 @@ def _with_options(
     for option in reversed(options):
         gathered = option(gathered)
     return gathered
-
-
-def by_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the option of the person."""
-    return click.option(
-        "--by", metavar="WHO", default=getpass.getuser, help="Who does it, for the audit trail. [default: your login]"
-    )(command)
 
 
 def proof_options(command: Callable[..., Any]) -> Callable[..., Any]:

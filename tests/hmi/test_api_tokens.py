@@ -4,8 +4,7 @@ import time
 
 from click.testing import CliRunner
 
-from hmi.api.access import RefusedTokens
-from hmi.api.tokens import ApiTokens
+from hmi.api.tokens import ApiTokens, RefusedTokens
 from hmi.web.roles import Role
 from station.cli import cli
 
