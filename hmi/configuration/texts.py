@@ -3,7 +3,7 @@
 from hmi.web.text import define
 
 define("configuration.tab", "Configuration")
-define("configuration.no_file", "The station runs by its defaults: there is no configuration file to edit.")
+define("configuration.no_file", "The station uses its default settings: there is no configuration file to edit.")
 define(
     "configuration.next_start",
     "A change takes effect at the next start of the station. On an installation: {command}. Elsewhere end station run"
@@ -11,7 +11,7 @@ define(
 )
 define("configuration.saved", "Saved. It takes effect at the next start.")
 define("configuration.not_saved", "Not saved: the text has mistakes. The file is as it was.")
-define("configuration.broken", "The file has mistakes. The next start needs them mended.")
+define("configuration.broken", "The file has mistakes. Correct them before the next start.")
 define("configuration.nothing_changed", "Nothing was changed.")
 define("configuration.changed_meanwhile", "Not saved: the file was changed meanwhile. Open the page again.")
 define("configuration.not_written", "Not saved: the file cannot be written: {detail}.")

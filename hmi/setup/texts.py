@@ -29,7 +29,8 @@ define("setup.how.arm", "Power it and set it to remote control, or change the ad
 define("setup.how.camera", "Plug it in, or change its serial number and restart the station.")
 define(
     "setup.how.plc",
-    "The PLC connects to this address and moves its heartbeat. The configuration permits its address.",
+    "Connect the PLC to this address, and let its program change the heartbeat. The configuration has to permit the"
+    " PLC's address.",
 )
 define(
     "setup.how.poses",

@@ -18,7 +18,7 @@ class Right(StrEnum):
     """An action that needs a role."""
 
     RUN = "run"
-    """Start, stop and call off; lots; recover after a stop."""
+    """Start, stop and abort; lots; recover after a stop."""
     CHANGE_FRUIT = "change_fruit"
     HANDLE_ALARMS = "handle_alarms"
     """Acknowledge and shelve."""

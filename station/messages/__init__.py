@@ -1,7 +1,7 @@
-"""Everything the station can say; one module for each room that says it. Importing the package defines all of it."""
+"""Catalogue of the station's messages, one module for each package. Importing the package defines all of them."""
 
 from importlib import import_module
 from pkgutil import iter_modules
 
-for _room in iter_modules(__path__, "station.messages."):
-    import_module(_room.name)
+for _module in iter_modules(__path__, "station.messages."):
+    import_module(_module.name)

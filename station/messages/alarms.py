@@ -107,7 +107,7 @@ GRIPPER_JAM = AlarmTexts(
     define("alarm.action.gripper_jam", "Look for what blocks the fingers and take it out."),
 )
 CAMERA_LOST = AlarmTexts(
-    define("alarm.cause.camera_lost", "The tactile camera gives no frames, or none of its protocol."),
+    define("alarm.cause.camera_lost", "The tactile camera sends no frames, or frames that cannot be used."),
     _REFUSED,
     define("alarm.action.camera_lost", "Check the camera's cable; the station connects again by itself."),
 )
@@ -115,13 +115,14 @@ CAMERA_STALE = AlarmTexts(
     define("alarm.cause.camera_stale", "The camera repeats the same frame, or its frames come late."),
     _REFUSED,
     define(
-        "alarm.action.camera_stale", "Pull the camera's plug and put it in again; if it comes back, change the camera."
+        "alarm.action.camera_stale",
+        "Unplug the camera and plug it in again; if the alarm comes back, replace the camera.",
     ),
 )
 CAMERA_LED_DEAD = AlarmTexts(
     define(
         "alarm.cause.camera_led_dead",
-        "The light of the untouched gel is not the golden reference's: a colour of it is missing.",
+        "The illumination of the untouched gel differs from the golden reference's: one colour is missing.",
     ),
     _NO_RESULT,
     define(
@@ -158,7 +159,8 @@ REFERENCE_BAD = AlarmTexts(
 REFERENCE_DRIFTING = AlarmTexts(
     define(
         "alarm.cause.reference_drifting",
-        "The light of the untouched gel moves away from the golden reference's: halfway to where it is refused.",
+        "The illumination of the untouched gel has drifted from the golden reference by more than half of what is "
+        "allowed.",
     ),
     define("alarm.consequence.reference_drifting", "Areas become less certain; further away the reference is refused."),
     define(
@@ -242,7 +244,7 @@ NO_RECIPE = AlarmTexts(
     define("alarm.action.no_recipe", "Choose the fruit's recipe at the panel or by the PLC's command."),
 )
 CLOCK_STEPPED = AlarmTexts(
-    define("alarm.cause.clock_stepped", "The machine's clock was set by more than a moment."),
+    define("alarm.cause.clock_stepped", "The machine's clock was set by more than 2 s."),
     define(
         "alarm.consequence.clock_stepped",
         "Records before and after it do not follow each other by their time; durations are right.",
@@ -311,7 +313,7 @@ OUTBOX_BEHIND = AlarmTexts(
     ),
     define(
         "alarm.consequence.outbox_behind",
-        "It shows the past; nothing is lost, and the line continues. What waits is sent in order once it can be.",
+        "It shows old data; nothing is lost, and the line continues. What waits is sent in order once it can be.",
     ),
     define(
         "alarm.action.outbox_behind",

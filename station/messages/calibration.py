@@ -261,5 +261,5 @@ LAY_BALL = define(
 )
 NOT_WAITING = define("calibration.not_waiting", "nothing waits for the ball at this moment; look at the run again")
 NOT_BEGUN = define("calibration.not_begun", "nothing was begun with the ball; begin it first")
-CALLED_OFF = define("calibration.called_off", "called off: nothing was stored")
+CALLED_OFF = define("calibration.called_off", "aborted: nothing was stored")
 BALL_LATE = define("calibration.ball_late", "nobody laid the ball within {limit_min} min; begin again")

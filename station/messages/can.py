@@ -156,7 +156,7 @@ DRIVER_FAILED = define("can.driver_failed", "the CAN driver failed; read its log
 DRIVER_STOPPED = define("can.driver_stopped", "the driver was stopped")
 
 # Reject actuations.
-SHOT = define("can.shot", "shot {sequence}: {what}", sequence=Number(), what=Nested())
+SHOT = define("can.shot", "reject {sequence}: {what}", sequence=Number(), what=Nested())
 NOT_ORDERED = define("can.not_ordered", "it was not ordered: {why}", why=Nested())
 FIRED_LATE = define(
     "can.fired_late",
@@ -180,7 +180,7 @@ LANE_REFUSED = define(
     lane=Number(),
     answer=Number(),
 )
-ORDERED_TWICE = define("can.ordered_twice", "it is ordered already; give each shot a sequence of its own")
+ORDERED_TWICE = define("can.ordered_twice", "it is ordered already; give each reject a sequence of its own")
 ORDER_MALFORMED = define(
     "can.order_malformed",
     "expected a sequence from 1 to {most}, a lane from 1 to {lanes} and a count from 0 to {most}, found {sequence}, "
@@ -209,6 +209,6 @@ BELT_SLOW = define("can.belt_slow", "the belt did not reach count {at_count} wit
 GATE_LOST = define("can.gate_lost", "the gate was lost before it reported ({why}); look at the fruit", why=Nested())
 UNORDERED_REPORT = define(
     "can.unordered_report",
-    "the gate reports shot {sequence}, which was not ordered; check that there is no second master on the bus",
+    "the gate reports reject {sequence}, which was not ordered; check that there is no second master on the bus",
     sequence=Number(),
 )

@@ -6,7 +6,7 @@ MODE_UNKNOWN = define(
     "command.mode_unknown", "mode {mode}: expected 1 (production), 2 (maintenance) or 3 (manual)", mode=Number()
 )
 MODE_KEPT = define(
-    "command.mode_kept", "{activity} at the panel needs this mode: let it end, or call it off there", activity=Nested()
+    "command.mode_kept", "{activity} at the panel needs this mode: let it end, or abort it there", activity=Nested()
 )
 MODE_NOT_STORED = define(
     "command.mode_not_stored",
@@ -38,7 +38,7 @@ CONFIRM_STOP = define(
     "a person has to confirm this stop at the cell, with `station devices recover`, before the reset: {stop}",
     stop=Nested(),
 )
-BUSY_CALL_OFF = define("command.busy_call_off", "an inspection is under way: call it off first")
+BUSY_CALL_OFF = define("command.busy_call_off", "an inspection is under way: abort it first")
 BUSY = define("command.busy", "an inspection is under way: wait for its end")
 JUDGED = define("command.judged", "the inspection is already judged")
 ANOTHER_FRUIT = define(

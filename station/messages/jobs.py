@@ -4,8 +4,8 @@ from station.messages.message import Number, define, define_plural
 
 TOO_MANY = define_plural(
     "job.too_many",
-    "{number} export or replay is under way; wait for it, or call it off",
-    "{number} exports and replays are under way; wait for one, or call one off",
+    "{number} export or replay is under way; wait for it, or cancel it",
+    "{number} exports and replays are under way; wait for one, or cancel one",
     "number",
 )
 NO_FOLDER = define("job.no_folder", "{folder}: {error}; make it writable")
@@ -22,5 +22,5 @@ NOT_RECENT = define(
     "job.not_recent", "inspection {sequence} is not among the last {number}: look into the history", sequence=Number()
 )
 PICTURE_NOT_ENCODED = define("job.picture_not_encoded", "the picture could not be encoded")
-NO_TIME = define("job.no_time", "{utc_ms} ms is no time of a calendar; give another one")
+NO_TIME = define("job.no_time", "{utc_ms} ms is outside the calendar; give another time")
 UNPRINTABLE = define("job.unprintable", "{text} contains what cannot be printed; give a name of printable letters")

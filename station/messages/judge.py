@@ -6,7 +6,7 @@ from station.messages.message import Listed, Nested, Number, define, define_plur
 REFERENCE_BAD = define(
     "judge.reference_bad", "The reference images were not usable, so nothing could be compared with them."
 )
-IMAGE_STALE = define("judge.image_stale", "No image as new as the step came in time.")
+IMAGE_STALE = define("judge.image_stale", "No image taken after the step came in time.")
 LATE = define("judge.late", "The inspection did not end within its deadline.")
 CALLED_OFF = define("judge.called_off", "The inspection was aborted.")
 ARM_FAULT = define("judge.arm_fault", "The arm failed or was stopped during the inspection.")

@@ -10,11 +10,11 @@ SET_MANUAL = define(
     mode=Number(),
     manual=Number(),
 )
-UNDER_WAY = define("maintenance.under_way", "Under way: {activity}. Let it end, or call it off.", activity=Nested())
+UNDER_WAY = define("maintenance.under_way", "Under way: {activity}. Let it end, or abort it.", activity=Nested())
 IMAGE_BUSY = define("maintenance.image_busy", "An inspection is under way: the image is shown as it is.")
 IMAGE_NO_RECIPE = define("maintenance.image_no_recipe", "No recipe is active: its method measures the contact.")
 JOG_WIDTH = define(
-    "maintenance.jog_width", "to jog the gripper: expected a width where it is to go to one, and none elsewhere"
+    "maintenance.jog_width", "to jog the gripper: give a width if it is to move to one, and none otherwise"
 )
 JOG_TOO_WIDE = define(
     "maintenance.jog_too_wide", "the fingers open to {widest_mm} mm, not to {width_mm} mm", widest_mm=Number(1)

@@ -220,9 +220,9 @@ def verbatim(text: str) -> Message:
 
 
 def message_of(error: BaseException) -> Message:
-    """Return what an error says: its message, or its own words."""
-    said = getattr(error, "message", None)
-    return said if isinstance(said, Message) else verbatim(str(error) or type(error).__name__)
+    """Return an error's message; its text as a verbatim message where it has none."""
+    message = getattr(error, "message", None)
+    return message if isinstance(message, Message) else verbatim(str(error) or type(error).__name__)
 
 
 def message_in(text: str) -> Message | None:

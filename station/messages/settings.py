@@ -5,7 +5,7 @@ from station.messages.message import Listed, Nested, Number, define, define_plur
 # A problem and its place.
 PROBLEMS = define("settings.problems", "{problems}", problems=Listed("\n"))
 PROBLEM = define("settings.problem", "{place}: {field}: {expected}", place=Nested(), field=Nested(), expected=Nested())
-MORE = define("settings.more", "and more: mend these first")
+MORE = define("settings.more", "and more: correct these first")
 LINE = define("settings.line", "{file}:{line}", line=Number())
 PATH = define("settings.path", "{path}")
 ENVIRONMENT = define("settings.environment", "environment")

@@ -64,7 +64,7 @@ def test_an_alarm_of_a_station_that_does_not_answer_is_not_renewed_as_if_it_were
 @pytest.mark.timeout(240)
 def test_the_life_of_an_alarm(ready, operator, panel, eventually):
     def life():
-        rows = operator.page.locator(".log tbody tr", has_text="camera gives no frames").all_inner_texts()
+        rows = operator.page.locator(".log tbody tr", has_text="camera sends no frames").all_inner_texts()
         return [re.findall("raised|shown again|shelved|returned to normal|acknowledged", row)[0] for row in rows][::-1]
 
     operator.open("/alarms/history")
@@ -72,8 +72,8 @@ def test_the_life_of_an_alarm(ready, operator, panel, eventually):
     ready.twin(do="set", device="camera", fault="off")
     try:
         operator.open("/alarms")
-        operator.until(".alarm-line", "tactile camera gives no frames")
-        alarm = operator.page.locator(".alarm", has_text="tactile camera gives no frames")
+        operator.until(".alarm-line", "tactile camera sends no frames")
+        alarm = operator.page.locator(".alarm", has_text="tactile camera sends no frames")
         assert "not acknowledged" in alarm.inner_text()
         reader = panel()
         reader.open("/alarms/camera_lost")
