@@ -56,7 +56,6 @@ MEANT: dict[str, tuple[str, ...]] = {
     ),
     "shot": ("station/twin/can/gate.py", "station/twin/can/line.py"),  # `can.shot_deadline_s`
     "sound diverted": ("README.md", "docs/sorting.md", "docs/triggers.md"),  # column headings of a result
-    "stands": ("docs/plc/handshake-table.md",),
     "witness": ("docs/robust-constants.md",),
 }
 """Files in which a word is meant literally, or is part of a published name."""
