@@ -356,7 +356,7 @@ def test_a_result_that_comes_too_late_is_not_shown(cell, until):
             await until(lambda: running in station.published)
             station.running = running
             station.finish("PASS")
-            await until(lambda: "which stands" in made.log.read_text())
+            await until(lambda: "which is final" in made.log.read_text())
             assert (await plc.read())["result_outcome"] == "NO_RESULT"
             assert (await plc.group("counters"))["count_late"] == 1
 
