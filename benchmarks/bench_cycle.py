@@ -47,12 +47,15 @@ from station.devices.camera.open import camera_from
 from station.devices.gripper.robotiq import make_gripper
 from station.inspection.press import FINEST_STEP_MM
 from station.press.stop import MOST_UNSEEN_MM
+from station.records.database import reading
 from station.records.model import FullRecord
+from station.records.queries import read_inspection
 from station.records.records import Records
 from station.runtime.devices.rig import Cell, DeviceRig, at_once
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.plc import line_endpoint
-from station.settings.recipe import Recipe, load_recipes
+from station.settings.recipe import load_recipes
+from station.settings.recipe_model import Recipe
 from station.twin.console import ask
 from station.twin.fruit import Kind, draw_fruit
 from station.vocabulary import PackmlState
@@ -316,7 +319,8 @@ async def floors(configuration: Configuration, results: Mapping[str, Pace]) -> S
         await arm.move_to("above_nest")
         for kind in FRUIT:
             for inspected in results[kind].alone:
-                record = await records.inspection(inspected.sequence)
+                with reading(records.folder) as connection:
+                    record = read_inspection(connection, inspected.sequence, records.folder)
                 if record.judged is None or record.judged.measures.get("closings") != 1:
                     continue
                 lay(kind, inspected.seed)

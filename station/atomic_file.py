@@ -54,6 +54,19 @@ def write_atomically(
         sync_folder(folder or ".")
 
 
+def sync_file(path: Path | str) -> None:
+    """Make a file's content durable; its name is made so by `sync_folder`.
+
+    Raises:
+        OSError: it may not be durable.
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
 def sync_folder(folder: Path | str) -> None:
     """Make the names in a folder durable.
 

@@ -4,7 +4,8 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from station.records.database import FILE_NAME, migrate, open_engine, plain
+from station.records.database import FILE_NAME, open_engine, plain
+from station.records.migration import migrate
 from station.records.search_index import HOUR_MS
 from station.vocabulary import Reason
 

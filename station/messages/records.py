@@ -44,7 +44,6 @@ NUMBER_GIVEN = define("records.number_given", "{number} was given already", numb
 NO_RECORDS = define("records.no_records", "there is no {path}")
 CLOSED = define("records.closed", "they are closed")
 TOO_SLOW = define("records.too_slow", "the disk did not take it within {limit_s} s")
-NO_ANSWER = define("records.no_answer", "no answer within {limit_s} s")
 NEWER_SCHEMA = define("records.newer_schema", "{path} has the schema {schema} of a newer fruit-station")
 NOT_MIGRATED = define(
     "records.not_migrated", "the database could not be brought from schema {before} to {after}: {words}"
@@ -205,7 +204,6 @@ RESTORE_OR_START = define(
 )
 OPEN_FIRST = define("records.open_first", "open them first")
 CHECK_DISK = define("records.check_disk", "check the disk, or raise records.deadline_s")
-CHECK_DISK_AND_REPEAT = define("records.check_disk_and_repeat", "check the disk, or ask again")
 USE_NEWER = define("records.use_newer", "use the version that made it")
 INSTALL_NEWER = define(
     "records.install_newer", "install that version again, or put back the copy in {folder} that this version made"

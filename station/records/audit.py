@@ -25,6 +25,7 @@ RESTORED = "records.restored"
 STATION = "station"
 """Actor, and role, where no person acts."""
 LONGEST_WORD, LONGEST_REASON = 64, 1000
+"""Characters of who, role and action; of subject and reason."""
 
 _LAST = select(audit).order_by(audit.c.seq.desc()).limit(1)
 _NEWER = select(audit.c.seq, audit.c.hash).where(audit.c.seq > bindparam("known")).order_by(audit.c.seq.desc()).limit(1)
@@ -59,7 +60,7 @@ class AuditRow:
     """A row of the trail."""
 
     seq: int
-    """Rises by one; never given twice in one folder of records."""
+    """Rises by one, by more where known rows were lost; never given twice in one folder of records."""
     utc_ms: int
     who: str
     role: str
@@ -109,7 +110,10 @@ def continue_audit(connection: Connection, known: Head | None) -> AuditRow | Non
 
 
 def note_unsigned(connection: Connection, known: Head | None) -> None:
-    """Append, at a start, a row if there are rows beyond the signed head: of a killed station, or nobody knows."""
+    """Append, at a start, a row if rows follow the signed head.
+
+    A killed station left them, or somebody else wrote them.
+    """
     last = last_row(connection)
     if known is not None and last is not None and last.seq > known.seq and _continues(connection, known, last):
         append_audit(connection, AuditEntry(STATION, STATION, UNSIGNED, "audit", "", _named(known), _named(last)))
@@ -140,7 +144,10 @@ def has_row(connection: Connection, head: Head) -> bool:
 
 
 def _continues(connection: Connection, known: Head, last: AuditRow | None) -> bool:
-    """Check that the trail has the known row, or ends with a restore in place of it that could not save its own."""
+    """Check that the trail has the known row, or ends with a restore that replaced it.
+
+    The restore's own head could not be saved then.
+    """
     if has_row(connection, known):
         return True
     if last is None or last.action != RESTORED or last.old is None:

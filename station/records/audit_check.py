@@ -2,8 +2,8 @@
 
 import json
 import time
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sqlalchemy import Connection, select
@@ -23,7 +23,7 @@ class Proof:
     """What a person who checks records knows from elsewhere."""
 
     anchors: tuple[Head, ...] = ()
-    """Rows that the trail must have."""
+    """Rows that the trail must have, as from a backup or a printed report."""
     keys: PublicKeys = ()
     """The station's public key, and those that it had before; empty for the one in the records' folder."""
     since: int = 0
@@ -65,22 +65,19 @@ def check_trail(folder: Path, proof: Proof = NO_PROOF) -> AuditCheck:
             last = last_row(connection)
             behind = keys and head is not None and last is not None and head.seq < last.seq
             if not behind or time.monotonic() > until_s:
-                return check_audit(connection, head, proof.anchors, proof.since, keys)
+                return check_audit(connection, head, replace(proof, keys=keys))
         time.sleep(_AGAIN_S)
 
 
-def check_audit(
-    connection: Connection, saved: Head | None, anchors: Iterable[Head] = (), since: int = 0, keys: PublicKeys = ()
-) -> AuditCheck:
+def check_audit(connection: Connection, saved: Head | None, proof: Proof = NO_PROOF) -> AuditCheck:
     """Check the trail from its first row to its last.
 
     Args:
         saved: the head stored outside the database; None if it is missing.
-        anchors: rows known from other sources, as a backup or a printed report.
-        since: skip rows before this one, as after a known and explained break.
-        keys: of the station; the head, and each signed anchor, has to be signed by one of them. Without keys no
-            signature is checked, and rows beyond the head are no fault.
+        proof: the head, and each signed anchor, has to be signed by one of its keys. Without keys no signature is
+            checked, and rows beyond the head are no fault.
     """
+    anchors, since, keys = proof.anchors, proof.since, proof.keys
     broken: list[str] = []
     notes: list[str] = []
     number, before, hashes = 0, None, dict[int, str]()
@@ -117,7 +114,7 @@ def check_audit(
     return AuditCheck(number, head, tuple(broken), tuple(notes))
 
 
-def _signatures(saved: Head | None, anchors: Iterable[Head], keys: PublicKeys) -> Iterator[str]:
+def _signatures(saved: Head | None, anchors: tuple[Head, ...], keys: PublicKeys) -> Iterator[str]:
     """Yield the faults of the signatures."""
     if saved is not None and not saved.is_signed(keys):
         yield f"row {saved.seq}: the head kept beside the database is not signed by the station's key"

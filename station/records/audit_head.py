@@ -1,6 +1,6 @@
 """Head of the audit trail, signed and stored outside the database: without it, a cut-off end would not be found.
 
-Two lines of fixed length, written in turn in place, as the sequence mark's. It is saved after the commit of new rows,
+Two lines of fixed length, written in turn in place, as in `high_water_mark`. It is saved after the commit of new rows,
 so it may be some rows behind, never ahead. A head as `ROW:HASH:SIGNATURE` is an anchor: stored elsewhere, it proves the
 trail up to its row.
 """
@@ -21,6 +21,7 @@ FILE_NAME = "audit_head"
 log = logging.getLogger(__name__)
 
 _SIGNATURE_LETTERS = 86
+"""64 bytes in base64 without padding."""
 _LINE_BYTES = 10 + 1 + 64 + 1 + _SIGNATURE_LETTERS + 1 + 8 + 1
 _UNSIGNED_LINE_BYTES = 10 + 1 + 64 + 1 + 8 + 1
 """As versions before the signatures wrote it."""

@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from station.atomic_file import sync_folder
+from station.atomic_file import sync_file, sync_folder
 from station.clock import utc_ms
 from station.messages import records as messages
 from station.records.audit import has_row, newer_head
@@ -30,7 +30,6 @@ MANIFEST_NAME = "backup.json"
 SIGNATURE_NAME = "backup.sig"
 """The station's Ed25519 signature of the manifest's bytes: 64 bytes, as `openssl pkeyutl -verify -rawin` reads them."""
 _PARTIAL = ".partial"
-_CHUNK_BYTES = 1 << 20
 _LONGEST_MANIFEST_BYTES, _LONGEST_SIGNATURE_BYTES = 1 << 26, 64
 
 
@@ -76,7 +75,7 @@ def make_backup(folder: Path, directory: Path, reserve_bytes: int = 0) -> Manife
         content = manifest.model_dump_json(indent=1).encode()
         for name, data in ((MANIFEST_NAME, content), (SIGNATURE_NAME, sign(folder, content))):
             (partial / name).write_bytes(data)
-            _sync(partial / name)
+            sync_file(partial / name)
         sync_folder(partial)
         partial.rename(directory)
         sync_folder(directory.parent)
@@ -160,17 +159,14 @@ def copy_image(source: Path, target: Path, sha256: str, size_bytes: int) -> int:
         raise DamagedError(messages.OTHER_CONTENT(path=str(source)), messages.PUT_BACK_BACKUP())
     target.parent.mkdir(exist_ok=True)
     target.write_bytes(content)
-    _sync(target)
+    sync_file(target)
     return len(content)
 
 
 def hash_of(path: Path) -> str:
     """Return a file's SHA-256, hexadecimal."""
-    digest = hashlib.sha256()
     with path.open("rb") as file:
-        while chunk := file.read(_CHUNK_BYTES):
-            digest.update(chunk)
-    return digest.hexdigest()
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def integrity(connection: sqlite3.Connection) -> Iterator[str]:
@@ -198,7 +194,7 @@ def _copied(folder: Path, partial: Path) -> Manifest:
     with closing(sqlite3.connect(path)) as target:
         inspections, last = target.execute("SELECT count(outcome), max(sequence) FROM inspections").fetchone()
         (referred_to,) = target.execute("SELECT count(DISTINCT sha256) FROM images").fetchone()
-    _sync(path)
+    sync_file(path)
     return Manifest(
         made_utc_ms=utc_ms(),
         sequence=max(HighWaterMark(folder / MARK_NAME).value, last or 0),
@@ -253,11 +249,6 @@ def _room(folder: Path, place: Path, reserve_bytes: int) -> None:
         raise DiskFullError(
             messages.NO_SPACE_FOR_BACKUP(path=str(place), free=free, wanted=wanted), messages.FREE_SPACE_OR_OTHER()
         )
-
-
-def _sync(path: Path) -> None:
-    with path.open("rb") as file:
-        os.fsync(file.fileno())
 
 
 def _remove(partial: Path) -> None:

@@ -1,9 +1,7 @@
-"""SQLite database file: opening, damage check, migration, and moving aside when it is damaged."""
+"""SQLite database file: opening, damage check, and moving aside when it is damaged."""
 
 import json
 import math
-import os
-import shutil
 import sqlite3
 import time
 from collections.abc import Iterator
@@ -15,16 +13,19 @@ from typing import Any, Literal
 from sqlalchemy import Connection, Engine, create_engine, event
 from sqlalchemy.pool import NullPool
 
-from station.atomic_file import sync_folder
 from station.messages import records as messages
 from station.records.error_mapping import map_error
-from station.records.errors import DamagedError, DiskFullError, LockedError, ReadOnlyError, RecordsError, SchemaError
+from station.records.errors import DamagedError, RecordsError
 
 FILE_NAME = "records.sqlite3"
-MIGRATIONS = Path(__file__).parent / "migrations"
 CHECK_S = 5.0
 """Longest check of a large database at a start; SQLite itself reports damage found later."""
 BUSY_MS = 1000
+"""Longest wait of SQLite for another process's transaction, ms."""
+_LOG_BYTES = 64 * 1024 * 1024
+"""The write-ahead log is cut back to this after a checkpoint, bytes; an estimate."""
+_CHECK_INSTRUCTIONS = 10_000
+"""SQLite instructions between two checks of the time; an estimate."""
 
 
 def records_folder(home: Path) -> Path:
@@ -56,7 +57,7 @@ def open_engine(path: Path, mode: Literal["ro", "rw", "rwc"]) -> Engine:
         if not read_only:
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = FULL")
-            connection.execute(f"PRAGMA journal_size_limit = {64 * 1024 * 1024}")
+            connection.execute(f"PRAGMA journal_size_limit = {_LOG_BYTES}")
 
     @event.listens_for(engine, "begin")
     def _begin(connection: Connection) -> None:
@@ -75,7 +76,7 @@ def check(path: Path, within_s: float = CHECK_S) -> None:
     until_s = time.monotonic() + within_s
     try:
         with closing(sqlite3.connect(path, timeout=BUSY_MS / 1000)) as connection:
-            connection.set_progress_handler(lambda: time.monotonic() > until_s, 10_000)
+            connection.set_progress_handler(lambda: time.monotonic() > until_s, _CHECK_INSTRUCTIONS)
             found = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
     except sqlite3.Error as error:
         if getattr(error, "sqlite_errorcode", 0) == sqlite3.SQLITE_INTERRUPT:
@@ -105,89 +106,6 @@ def move_aside(folder: Path, aside: Path, *names: str) -> None:
 def stamp() -> str:
     """Return date and time as part of a file's name, never the same twice."""
     return datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
-
-
-def migrate(engine: Engine, folder: Path) -> None:
-    """Migrate the schema to the newest version, after a copy of the database was made in the folder's `backups`.
-
-    Raises:
-        SchemaError: it is a newer program's, or a migration failed; then it is unchanged.
-        RecordsError: it cannot be read or written.
-    """
-    from alembic import command  # noqa: PLC0415 (it takes long to load, and who only reads needs none of it)
-    from alembic.config import Config  # noqa: PLC0415
-    from alembic.migration import MigrationContext  # noqa: PLC0415
-    from alembic.script import ScriptDirectory  # noqa: PLC0415
-
-    config = Config()
-    config.set_main_option("script_location", str(MIGRATIONS).replace("%", "%%"))
-    scripts = ScriptDirectory.from_config(config)
-    backup: Path | None = None
-    with engine.begin() as connection:
-        found = MigrationContext.configure(connection).get_current_revision()
-        if found == scripts.get_current_head():
-            return
-        known = {script.revision for script in scripts.walk_revisions()}
-        if found is not None and found not in known:
-            raise SchemaError(
-                messages.NEWER_SCHEMA(path=str(engine.url.database), schema=found),
-                messages.INSTALL_NEWER(folder=str(folder / "backups")),
-            )
-    if found is not None:
-        backup = _backed_up(folder, found)
-    try:
-        with engine.begin() as connection:
-            config.attributes["connection"] = connection
-            command.upgrade(config, "head")
-    except Exception as error:
-        told = map_error(error, str(folder / FILE_NAME))
-        if isinstance(told, (DiskFullError, ReadOnlyError, LockedError, DamagedError)):
-            raise told from error
-        head = scripts.get_current_head()
-        raise SchemaError(
-            messages.NOT_MIGRATED(before=str(found), after=str(head), words=str(error)),
-            messages.INSTALL_EARLIER_COPY(path=str(backup)) if backup else messages.INSTALL_EARLIER(),
-        ) from error
-
-
-def make_schema(connection: Connection, revision: str) -> None:
-    """Make the tables, indexes and triggers of a version in an empty database.
-
-    Raises:
-        SchemaError: this program does not know the version.
-    """
-    from alembic import command  # noqa: PLC0415 (see `migrate`)
-    from alembic.config import Config  # noqa: PLC0415
-    from alembic.util import CommandError  # noqa: PLC0415
-
-    config = Config()
-    config.set_main_option("script_location", str(MIGRATIONS).replace("%", "%%"))
-    config.attributes["connection"] = connection
-    try:
-        command.upgrade(config, revision)
-    except CommandError as error:
-        raise SchemaError(
-            messages.NEWER_SCHEMA(path=str(connection.engine.url.database), schema=revision), messages.USE_NEWER()
-        ) from error
-
-
-def _backed_up(folder: Path, revision: str) -> Path:
-    """Copy the whole database, durably before the copy gets its name. What a killed start left is removed first."""
-    backup = folder / "backups" / f"{stamp()}-form-{revision}.sqlite3"
-    backup.parent.mkdir(exist_ok=True)
-    for left in backup.parent.glob("*.partial"):
-        left.unlink()
-    size_bytes = (folder / FILE_NAME).stat().st_size
-    if shutil.disk_usage(folder).free < 2 * size_bytes:
-        raise DiskFullError(messages.NO_SPACE_FOR_COPY(path=str(backup), size_bytes=size_bytes), messages.FREE_SPACE())
-    partial = backup.with_suffix(".partial")
-    with closing(sqlite3.connect(folder / FILE_NAME)) as source, closing(sqlite3.connect(partial)) as target:
-        source.backup(target)
-    with partial.open("rb") as file:
-        os.fsync(file.fileno())
-    partial.rename(backup)
-    sync_folder(backup.parent)
-    return backup
 
 
 def existing(folder: Path) -> Path:

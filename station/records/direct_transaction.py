@@ -15,10 +15,11 @@ from sqlalchemy.exc import DBAPIError
 from station.messages import records as messages
 from station.records.audit import continue_audit, newer_head
 from station.records.audit_head import read_head, try_save_head
-from station.records.database import FILE_NAME, check, migrate, open_engine
+from station.records.database import FILE_NAME, check, open_engine
 from station.records.error_mapping import map_error
 from station.records.errors import LockedError, RecordsError
 from station.records.high_water_mark import MARK_NAME, HighWaterMark
+from station.records.migration import migrate
 from station.records.open import lock_folder, was_used
 
 

@@ -41,7 +41,7 @@ class LockedError(RecordsError):
 
 
 class DamagedError(RecordsError):
-    """The database is damaged, or was removed while the station ran."""
+    """The database or a backup is damaged or not authentic, or the database was removed while the station ran."""
 
     code = "damaged"
 
@@ -59,7 +59,10 @@ class SequenceError(RecordsError):
 
 
 class RecordsDeadlineError(RecordsError):
-    """The deadline passed. The request is not carried out, or withdrawn, except an outcome or a change under way."""
+    """The deadline passed: a trigger is withdrawn, a request that has not started is dropped.
+
+    An outcome or a change under way may still be stored.
+    """
 
     code = "deadline"
 

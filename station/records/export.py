@@ -32,60 +32,40 @@ class Column(NamedTuple):
     name: str
     kind: pa.DataType
     sql: str
-    meaning: str
 
 
 COLUMNS = (
-    Column("sequence", pa.int64(), "i.sequence", "the inspection's number"),
-    Column("began", _TIME, "i.began_utc_ms", "when the trigger was accepted, UTC"),
-    Column("ended", _TIME, _OUTCOME.format("ended_utc_ms"), "when the outcome was decided, UTC"),
-    Column(
-        "duration_ms",
-        pa.int64(),
-        f"nullif({_OUTCOME.format('duration_ms')}, 0)",
-        "from trigger to outcome, by the monotonic clock; empty where it is not known",
-    ),
-    Column("trigger_id", pa.int64(), "i.trigger_id", "the PLC's"),
-    Column("encoder", pa.int64(), "i.encoder", "the line's encoder at the trigger"),
-    Column("lot", pa.string(), "i.lot", "as the PLC named it"),
-    Column("grower", pa.string(), "l.grower", "as told with the lot's begin"),
-    Column("fruit", pa.string(), "r.name", "the recipe's name"),
-    Column("recipe_sha256", pa.string(), "i.recipe_sha256", "of the recipe as it was"),
-    Column("outcome", pa.string(), "i.outcome", "what the PLC was told, or is to be told; empty while it runs"),
-    Column("reasons", pa.list_(pa.string()), _OUTCOME.format("reasons"), "of it, the first one decided"),
-    Column("judged", pa.string(), "i.judged", "the station's own view"),
-    Column("area_mm2", pa.float64(), _OUTCOME.format("area_mm2"), "the contact area that decided"),
-    Column("area_px", pa.int64(), _OUTCOME.format("area_px"), "the same"),
-    Column("closing_mm", pa.float64(), _OUTCOME.format("closing_mm"), "where it was measured"),
-    Column("confidence", pa.float64(), _OUTCOME.format("confidence"), "0 to 1"),
-    Column("late", pa.bool_(), _OUTCOME.format("late"), "after the deadline"),
-    Column("partial", pa.bool_(), _OUTCOME.format("partial"), "before the recipe's last step"),
-    Column("simulated", pa.bool_(), "i.simulated", "a twin's device took part"),
-    Column("published", _TIME, "i.published_utc_ms", "when the PLC was told, UTC"),
-    Column("acknowledged", _TIME, "i.acknowledged_utc_ms", "when the PLC took it, UTC"),
-    Column("closings_mm", pa.list_(pa.float64()), _LIST.format("closing_mm", "curve_points", "step"), "of each step"),
-    Column("areas_mm2", pa.list_(pa.float64()), _LIST.format("area_mm2", "curve_points", "step"), "of each step"),
-    Column("images", pa.list_(pa.string()), _LIST.format("sha256", "images", "id"), "the SHA-256 of those kept"),
-    Column(
-        "changed_areas_mm2",
-        pa.list_(pa.float64()),
-        _LIST.format("changed_area_mm2", "curve_points", "step"),
-        "of each step: how much of the image has changed",
-    ),
-    Column(
-        "fruit_length_mm",
-        pa.float64(),
-        "nullif(i.fruit_length_mm_x10, 0) / 10.0",
-        "as the PLC gave it with the trigger; empty where it did not",
-    ),
-    Column("size_class", pa.int64(), "nullif(i.size_class, 0)", "likewise"),
-    Column("recipe_revision", pa.string(), "r.revision", "of the recipe as it was; empty for none"),
-    Column(
-        "fruit_width_mm",
-        pa.float64(),
-        "CAST(json_extract(i.measures, '$.onset_mm') AS REAL)",
-        "between the jaws at the first contact; empty where there was none",
-    ),
+    Column("sequence", pa.int64(), "i.sequence"),
+    Column("began", _TIME, "i.began_utc_ms"),  # when the trigger was accepted
+    Column("ended", _TIME, _OUTCOME.format("ended_utc_ms")),
+    Column("duration_ms", pa.int64(), f"nullif({_OUTCOME.format('duration_ms')}, 0)"),  # by the monotonic clock
+    Column("trigger_id", pa.int64(), "i.trigger_id"),
+    Column("encoder", pa.int64(), "i.encoder"),
+    Column("lot", pa.string(), "i.lot"),
+    Column("grower", pa.string(), "l.grower"),
+    Column("fruit", pa.string(), "r.name"),  # the recipe's name
+    Column("recipe_sha256", pa.string(), "i.recipe_sha256"),
+    Column("outcome", pa.string(), "i.outcome"),  # for the PLC; empty while the inspection runs
+    Column("reasons", pa.list_(pa.string()), _OUTCOME.format("reasons")),  # of the outcome, the deciding one first
+    Column("judged", pa.string(), "i.judged"),  # the station's own judgement
+    Column("area_mm2", pa.float64(), _OUTCOME.format("area_mm2")),  # the contact area that decided
+    Column("area_px", pa.int64(), _OUTCOME.format("area_px")),
+    Column("closing_mm", pa.float64(), _OUTCOME.format("closing_mm")),
+    Column("confidence", pa.float64(), _OUTCOME.format("confidence")),
+    Column("late", pa.bool_(), _OUTCOME.format("late")),  # after the deadline
+    Column("partial", pa.bool_(), _OUTCOME.format("partial")),  # before the recipe's last step
+    Column("simulated", pa.bool_(), "i.simulated"),
+    Column("published", _TIME, "i.published_utc_ms"),
+    Column("acknowledged", _TIME, "i.acknowledged_utc_ms"),
+    Column("closings_mm", pa.list_(pa.float64()), _LIST.format("closing_mm", "curve_points", "step")),
+    Column("areas_mm2", pa.list_(pa.float64()), _LIST.format("area_mm2", "curve_points", "step")),
+    Column("images", pa.list_(pa.string()), _LIST.format("sha256", "images", "id")),  # SHA-256 of the stored images
+    Column("changed_areas_mm2", pa.list_(pa.float64()), _LIST.format("changed_area_mm2", "curve_points", "step")),
+    Column("fruit_length_mm", pa.float64(), "nullif(i.fruit_length_mm_x10, 0) / 10.0"),  # 0: the PLC gave none
+    Column("size_class", pa.int64(), "nullif(i.size_class, 0)"),
+    Column("recipe_revision", pa.string(), "r.revision"),
+    # Between the jaws at the first contact; empty where there was none.
+    Column("fruit_width_mm", pa.float64(), "CAST(json_extract(i.measures, '$.onset_mm') AS REAL)"),
 )
 """A list is JSON text in CSV."""
 SCHEMA = pa.schema([pa.field(column.name, column.kind) for column in COLUMNS])

@@ -17,11 +17,12 @@ from station.messages import records as messages
 from station.messages.message import Definition, Message
 from station.records.audit import continue_audit, newer_head, note_unsigned
 from station.records.audit_head import Head, read_head, try_save_head
-from station.records.database import FILE_NAME, check, migrate, move_aside, new_aside, open_engine
+from station.records.database import FILE_NAME, check, move_aside, new_aside, open_engine
 from station.records.error_mapping import map_error
-from station.records.errors import DamagedError, LockedError, RecordsError, SequenceError
+from station.records.errors import DamagedError, LockedError, SequenceError
 from station.records.high_water_mark import MARK_NAME, HighWaterMark
 from station.records.images import FOLDER_NAME, ImageStore
+from station.records.migration import migrate
 from station.records.schema import inspections
 from station.records.seals import begin_seals
 from station.records.signing import name_of, own_public_key
@@ -113,7 +114,7 @@ def open_records(folder: Path, settings: RecordsSettings, boot: str, failures: C
     try:
         mark = HighWaterMark(folder / MARK_NAME)
         notices = _move_damaged_aside(folder, mark)
-        _migrate(folder)
+        migrate(open_engine(path, "rwc"), folder)
         sync_folder(folder)
         writer = Writer(*_connector(path, mark), str(path), failures)
         try:
@@ -184,16 +185,6 @@ def was_used(folder: Path, mark: HighWaterMark) -> bool:
 
 def _lost_mark(mark: HighWaterMark) -> SequenceError:
     return SequenceError(messages.NUMBERS_UNKNOWN(path=str(mark.path)), messages.CONTINUE_AFTER())
-
-
-def _migrate(folder: Path) -> None:
-    """Migrate the schema."""
-    try:
-        migrate(open_engine(folder / FILE_NAME, "rwc"), folder)
-    except RecordsError:
-        raise
-    except Exception as error:
-        raise map_error(error, str(folder / FILE_NAME)) from error
 
 
 def _connector(

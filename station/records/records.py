@@ -7,7 +7,7 @@ import os
 import shutil
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,13 +19,13 @@ from station.channel.line import Outcome
 from station.messages import records as messages
 from station.messages.message import Message
 from station.records.audit import AuditEntry, AuditRow, append_audit
-from station.records.database import FILE_NAME, check, reading
+from station.records.database import FILE_NAME, check
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, DiskFullError, RecordsClosedError, RecordsDeadlineError, RecordsError
 from station.records.images import MB, accepted_is_stored
-from station.records.model import AlarmEntry, FullRecord, InspectionRecord, OpenInspections, StoredAlarm, Trigger
+from station.records.model import AlarmEntry, InspectionRecord, OpenInspections, StoredAlarm, Trigger
 from station.records.open import NOTICE_NAME, Notice, Opened, lock_folder, open_records
-from station.records.queries import read_alarms, read_inspection, read_open
+from station.records.queries import read_alarms, read_open
 from station.records.write_requests import (
     acknowledge,
     begin_again,
@@ -42,8 +42,6 @@ T = TypeVar("T")
 
 log = logging.getLogger(__name__)
 
-READING_S = 10.0
-"""Longest wait for a query's answer."""
 DAMAGE_S = 0.5
 """Longest search for damage while the station runs: some 500 MB of a database."""
 IMAGES_CLOSE_S = 5.0
@@ -298,14 +296,6 @@ class Records:
         """Return the inspections that began and were not acknowledged."""
         return await self._ask(read_open)
 
-    async def inspection(self, sequence: int) -> FullRecord:
-        """Return all stored data of one inspection.
-
-        Raises:
-            UnknownInspectionError: there is no record of it.
-        """
-        return await self._read(lambda connection: read_inspection(connection, sequence, self.folder))
-
     async def save_alarms(self, active: Sequence[StoredAlarm], log: Sequence[AlarmEntry] = ()) -> None:
         """Replace the stored alarms and append to their log in one transaction, without a deadline."""
         await self.change_to_end(lambda connection: replace_alarms(connection, active, log))
@@ -372,21 +362,6 @@ class Records:
         except TimeoutError:
             self._failures[RecordsDeadlineError.code] += 1
             raise RecordsDeadlineError(messages.TOO_SLOW(limit_s=deadline_s), messages.CHECK_DISK()) from None
-
-    async def _read(self, question: Callable[[Connection], T]) -> T:
-        self._get()
-
-        def ask() -> T:
-            with reading(self.folder) as connection:
-                return question(connection)
-
-        try:
-            async with asyncio.timeout(READING_S):
-                return await asyncio.get_running_loop().run_in_executor(self._helper, ask)
-        except TimeoutError:
-            raise RecordsDeadlineError(
-                messages.NO_ANSWER(limit_s=READING_S), messages.CHECK_DISK_AND_REPEAT()
-            ) from None
 
 
 def _size_bytes(file: Path) -> int:

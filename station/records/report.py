@@ -56,7 +56,7 @@ def _described(record: FullRecord) -> Iterator[str]:
         yield _field("simulated", "a twin's device took part")
     yield _field("size", size_sentence(trigger.size))
     yield from _why(judged, standing)
-    yield _field("told the PLC", _published_text(record))
+    yield _field("published", _published_text(record))
     if trigger.recipe:
         yield from _recipe(trigger.recipe)
     if judged:
@@ -86,7 +86,7 @@ def _why(judged: InspectionRecord | None, standing: Outcome | None) -> Iterator[
     else:
         yield _field("judged", "not")
     if standing and (judged is None or judged.outcome != standing.outcome or judged.reasons != standing.reasons):
-        yield _field("stands", standing.outcome)
+        yield _field("in force", standing.outcome)
         for reason in standing.reasons:
             yield f"  {reason}: {reason_message(reason)}"
 

@@ -10,16 +10,17 @@ from typing import NamedTuple
 
 from sqlalchemy import delete, func, insert, select
 
-from station.atomic_file import sync_folder
+from station.atomic_file import sync_file, sync_folder
 from station.messages import records as messages
 from station.records.audit import append_restored, newer_head
 from station.records.audit_head import Head, read_head, try_save_head
 from station.records.backup import Manifest, copy_image, hash_of, integrity, open_regular, read_manifest
-from station.records.database import FILE_NAME, migrate, move_aside, new_aside, open_engine
+from station.records.database import FILE_NAME, move_aside, new_aside, open_engine
 from station.records.error_mapping import map_error
 from station.records.errors import DamagedError, DiskFullError, RecordsError
 from station.records.high_water_mark import MARK_NAME, HighWaterMark
 from station.records.images import FOLDER_NAME, image_path
+from station.records.migration import migrate
 from station.records.open import BELONGING, RESTORING, lock_folder
 from station.records.retention import forget_missing, referred
 from station.records.schema import inspections, origins, outbox
@@ -146,6 +147,5 @@ def _continue(folder: Path, new: Path, manifest: Manifest, by: str) -> Head | No
         raise map_error(error, str(new / FILE_NAME)) from error
     with closing(sqlite3.connect(new / FILE_NAME)) as connection:
         connection.execute("PRAGMA journal_mode = DELETE")
-    with (new / FILE_NAME).open("rb") as file:
-        os.fsync(file.fileno())
+    sync_file(new / FILE_NAME)
     return head

@@ -5,8 +5,9 @@ import sqlite3
 from sqlalchemy import create_engine
 from sqlalchemy.pool import StaticPool
 
-from station.records.database import make_schema, plain
+from station.records.database import plain
 from station.records.errors import SchemaError
+from station.records.migration import make_schema
 
 _OBJECTS = """
 SELECT type || ' ' || name, sql FROM sqlite_master WHERE sql IS NOT NULL

@@ -60,7 +60,7 @@ def seal(connection: Connection, sequence: int, *parts: str) -> None:
 
 
 def begin_seals(connection: Connection, highest: int, public_key: str) -> None:
-    """Append, at a start, that the seals begin after the highest number given, or that the key is another one now."""
+    """Append, at a start, a row where the seals begin, or where the station has another key."""
     found = _rows(plain(connection), BEGAN)
     if not found or found[-1]["public_key"] != public_key:
         new = {"after": highest, "public_key": public_key}

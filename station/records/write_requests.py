@@ -64,7 +64,7 @@ def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot
         "recipe_checksum": recipe.checksum if recipe else 0,
     }
     del begun["recipe"]
-    _lost(begun)
+    _lost(begun)  # validates the trigger: even its station_lost outcome must be possible
     note_skipped(connection, sequence)
     sha256 = recipe.sha256 if recipe else None
     connection.execute(insert(inspections), {**begun, "boot": boot, "recipe_sha256": sha256, "images_state": ""})
@@ -222,7 +222,10 @@ def add_event(connection: Connection, name: str, sequence: int | None, details: 
 
 
 def add_images(connection: Connection, sequence: int, rows: Sequence[Mapping[str, Any]], state: Message) -> None:
-    """Add rows for images whose files are durable, and the number of stored images."""
+    """Store the state of an inspection's images, with rows for new ones whose files are durable.
+
+    Seals it, and queues the inspection if it is published.
+    """
     if rows:
         connection.execute(insert(images), [{"sequence": sequence, **row} for row in rows])
     table = inspections.c

@@ -29,6 +29,7 @@ Work = Callable[[Connection], T]
 """Part of the transaction, run in the writer's thread. It may raise a `RecordsError`."""
 
 LARGEST_BATCH = 128
+"""Requests in one commit at most; an estimate."""
 CONCERNING_ALL = (DiskFullError, ReadOnlyError, DiskError, LockedError, DamagedError)
 """Faults of the disk or the file, which roll back the whole transaction."""
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from alembic.script import ScriptDirectory
 
-from station.records.database import MIGRATIONS
+from station.records.migration import MIGRATIONS
 
 pytestmark = pytest.mark.timeout(900)  # on a busy machine pip takes its time
 

@@ -38,6 +38,7 @@ from station.records.model import RecipeSnapshot, Trigger
 from station.records.records import Records
 from station.records.short_transaction import short_transaction
 from tests.records.causes import because
+from tests.stored_inspection import read_record
 
 NOBODY = 65_534
 """The user without rights, by convention of the kernel (/proc/sys/kernel/overflowuid)."""
@@ -413,7 +414,7 @@ def test_a_database_taken_away_is_noticed_and_begun_anew_on_demand(
             assert notice.cause.id == messages.MISSING_DATABASE.id
             assert len(list(folder.glob("aside/*/images/*/*.png"))) == 1, "no images are taken for orphans"
             assert await records.published(outcome), "what only the interface still knows is taken from it"
-            full = await records.inspection(sequence)
+            full = read_record(records, sequence)
             assert (full.standing, full.judged, full.trigger.lot) == (outcome, None, "A-17")
             assert await records.begin(trigger) > sequence
 
@@ -437,7 +438,7 @@ def test_an_inspection_whose_database_was_taken_away_is_concluded_in_the_new_one
             with pytest.raises(UnknownInspectionError):
                 await records.conclude(sequence, failed)
             await records.published(await records.conclude(sequence, failed, trigger))
-            full = await records.inspection(sequence)
+            full = read_record(records, sequence)
             assert (full.trigger, full.judged.outcome, full.judged.curve) == (trigger, "FAIL", failed.curve)
 
     scenario(steps)
@@ -586,7 +587,7 @@ def test_a_folder_that_cannot_be_entered_is_an_error_of_the_records(opened, scen
                 with pytest.raises(ReadOnlyError, check=because(messages.NOT_WRITABLE)):
                     await records.find_damage()
                 with pytest.raises(ReadOnlyError, check=because(messages.NOT_WRITABLE)):
-                    await records.inspection(1)
+                    read_record(records, 1)
                 with pytest.raises(ReadOnlyError, check=because(messages.NOT_WRITABLE)), short_transaction(folder):
                     pass
             await records.find_damage()

@@ -16,10 +16,12 @@ from sqlalchemy import event
 
 from station.messages import records as messages
 from station.messages.message import verbatim
-from station.records.database import FILE_NAME, migrate, open_engine
+from station.records.database import FILE_NAME, open_engine
 from station.records.images import ImageStore, accepted_is_stored
+from station.records.migration import migrate
 from station.records.model import Image
 from station.records.retention import remove_oldest_images
+from tests.stored_inspection import read_record
 
 
 @pytest.fixture
@@ -43,7 +45,7 @@ def test_a_rejected_fruits_images_are_kept_without_loss(opened, scenario, inspec
         async with opened() as records:
             sequence = await inspected(records, *images)
             await settled(records)
-            full = await records.inspection(sequence)
+            full = read_record(records, sequence)
             assert full.images_state == messages.IMAGES_KEPT()
             assert [(image.kind, image.step) for image in full.images] == [
                 ("reference", None),
@@ -67,7 +69,7 @@ def test_a_share_of_the_accepted_is_kept(opened, scenario, inspected, noise, set
         async with opened(accepted_share=0.25, images_queue=64) as records:
             numbers = [await inspected(records, noise(), accepted=True) for _ in range(8)]
             await settled(records)
-            states = [(await records.inspection(number)).images_state for number in numbers]
+            states = [read_record(records, number).images_state for number in numbers]
             assert states == [*[messages.IMAGES_NOT_WANTED()] * 3, messages.IMAGES_KEPT()] * 2
 
     scenario(steps)
@@ -93,7 +95,7 @@ def test_beyond_the_quota_the_oldest_accepted_go_first_then_the_oldest_rejected(
                 return number
 
             async def kept():
-                return [n for n in numbers if (await records.inspection(n)).images_state == messages.IMAGES_KEPT()]
+                return [n for n in numbers if read_record(records, n).images_state == messages.IMAGES_KEPT()]
 
             numbers = [await add(accepted=False), await add(accepted=True), await add(accepted=True)]
             assert await kept() == [1, 2, 3]
@@ -103,15 +105,15 @@ def test_beyond_the_quota_the_oldest_accepted_go_first_then_the_oldest_rejected(
             assert await kept() == [1, 5, 6], "the accepted went before any rejected"
             numbers.append(await add(accepted=True))
             assert await kept() == [1, 5, 6], "an accepted one pushes out no rejected one"
-            last = await records.inspection(7)
+            last = read_record(records, 7)
             assert last.images_state == messages.IMAGES_DROPPED(cause=messages.QUOTA_FULL())
             numbers.append(await add(accepted=False))
             assert await kept() == [5, 6, 8]
-            assert (await records.inspection(1)).images_state == messages.IMAGES_REMOVED()
+            assert read_record(records, 1).images_state == messages.IMAGES_REMOVED()
             files = list((records.folder / "images").glob("*/*"))
             assert len(files) == 3
             assert records.status().image_bytes == sum(file.stat().st_size for file in files)
-            assert (await records.inspection(1)).judged is not None, "its record stays"
+            assert read_record(records, 1).judged is not None, "its record stays"
 
     scenario(steps)
 
@@ -126,9 +128,7 @@ def test_accepted_fruit_beyond_a_quota_that_is_full_of_rejected_ones_is_no_loss(
                 await settled(records)
             number = await inspected(records, noise(side_px=315), accepted=True)
             await settled(records)
-            assert (await records.inspection(number)).images_state == messages.IMAGES_DROPPED(
-                cause=messages.QUOTA_FULL()
-            )
+            assert read_record(records, number).images_state == messages.IMAGES_DROPPED(cause=messages.QUOTA_FULL())
             assert records.status().images == {"kept": 3, "over_quota": 1}
 
     scenario(steps)
@@ -159,7 +159,7 @@ def test_no_name_of_a_later_image_is_interned(opened, scenario, inspected, noise
             async def add():
                 number = await inspected(records, noise(side_px=315))
                 await settled(records)
-                assert len((await records.inspection(number)).images) == 1
+                assert len(read_record(records, number).images) == 1
                 assert records.status().database_bytes > 0
 
             for _ in range(5):
@@ -178,10 +178,10 @@ def test_images_larger_than_the_quota_are_dropped_and_it_is_said(opened, scenari
         async with opened(images_quota_mb=1) as records:
             sequence = await inspected(records, *(noise(side_px=315) for _ in range(4)))
             await settled(records)
-            assert "images_quota_mb allows 1000000" in str((await records.inspection(sequence)).images_state)
+            assert "images_quota_mb allows 1000000" in str(read_record(records, sequence).images_state)
         async with opened(images_quota_mb=0) as records:
             sequence = await inspected(records, noise())
-            assert (await records.inspection(sequence)).images_state == messages.IMAGES_NOT_WANTED()
+            assert read_record(records, sequence).images_state == messages.IMAGES_NOT_WANTED()
 
     scenario(steps)
 
@@ -201,14 +201,14 @@ def test_a_slow_disk_drops_images_and_never_holds_up_an_inspection(
     async def steps():
         async with opened(images_queue=2) as records:
             numbers = [await inspected(records, noise()) for _ in range(4)]
-            states = [(await records.inspection(number)).images_state for number in numbers]
+            states = [read_record(records, number).images_state for number in numbers]
             assert (
                 states
                 == [messages.IMAGES_PENDING()] * 2 + [messages.IMAGES_DROPPED(cause=messages.TOO_MANY_WAIT())] * 2
             )
             gate.set()
             await settled(records)
-            states = [(await records.inspection(number)).images_state for number in numbers[:2]]
+            states = [read_record(records, number).images_state for number in numbers[:2]]
             assert states == [messages.IMAGES_KEPT()] * 2
             assert records.status().images == {"kept": 2, "dropped": 2}
 
@@ -233,7 +233,7 @@ def test_a_disk_that_fills_up_among_the_images_costs_no_record(
         async with opened() as records:
             sequence = await inspected(records, noise(), noise(), noise())
             await settled(records)
-            found = await records.inspection(sequence)
+            found = read_record(records, sequence)
             assert found.standing is not None
             assert found.standing.outcome == "FAIL"
             assert len(found.images) == 2
@@ -250,7 +250,7 @@ def test_what_no_png_can_hold_is_said(opened, scenario, inspected, settled):
         async with opened() as records:
             sequence = await inspected(records, Image("step", 0, np.zeros((4, 4, 7), dtype=np.uint8)))
             await settled(records)
-            assert (await records.inspection(sequence)).images_state.id == messages.IMAGES_DROPPED.id
+            assert read_record(records, sequence).images_state.id == messages.IMAGES_DROPPED.id
             assert records.status().images == {"failed": 1}
 
     scenario(steps)
@@ -265,7 +265,7 @@ def test_a_start_removes_files_that_nothing_refers_to_and_says_which_images_were
             lost = await inspected(records, noise())
             await settled(records)
             folder = records.folder / "images"
-            (image,) = (await records.inspection(kept)).images
+            (image,) = read_record(records, kept).images
             orphans = [folder / "ab" / f"ab{'0' * 62}.png", folder / image.sha256[:2] / "x.partial"]
             for orphan in orphans:
                 orphan.parent.mkdir(exist_ok=True)
@@ -275,7 +275,7 @@ def test_a_start_removes_files_that_nothing_refers_to_and_says_which_images_were
             while any(orphan.exists() for orphan in orphans):
                 await asyncio.sleep(0.01)
             assert image.path in set(map(str, folder.glob("*/*.png")))
-            assert (await records.inspection(lost)).images_state == messages.IMAGES_LOST()
+            assert read_record(records, lost).images_state == messages.IMAGES_LOST()
 
     scenario(steps)
 
@@ -306,6 +306,6 @@ def test_states_of_before_messages_read_the_same(opened, scenario, inspected, no
             with connection:
                 connection.execute("UPDATE inspections SET images_state = ? WHERE sequence = ?", (stored, number))
             connection.close()
-            assert (await records.inspection(number)).images_state == state
+            assert read_record(records, number).images_state == state
 
     scenario(steps)

@@ -20,6 +20,7 @@ from station.records.model import OpenInspections
 from station.records.restore import restore_backup
 from station.records.signing import public_keys_of
 from tests.records.causes import because
+from tests.stored_inspection import read_record
 
 
 @pytest.fixture
@@ -51,17 +52,17 @@ def test_what_is_on_hold_stays_until_it_is_released(opened, scenario, inspected,
             assert said.output.endswith("stored of it: 1 images (kept)\n")
             for _ in range(2):
                 await inspected(records, 1, noise(side_px=320))
-            states = [(await records.inspection(number)).images_state for number in (1, 2, 3)]
+            states = [read_record(records, number).images_state for number in (1, 2, 3)]
             assert states == [messages.IMAGES_KEPT(), *[messages.IMAGES_REMOVED()] * 2]
             await records.change(lambda connection: hold(connection, "A-17", "the whole lot", "ada"))
             await inspected(records, 1, noise(side_px=320))
-            last = await records.inspection(6)
+            last = read_record(records, 6)
             assert last.images_state == messages.IMAGES_DROPPED(cause=messages.QUOTA_FULL())
             assert records.status().images["dropped"] == 1, "a rejected fruit's images are lost"
             await records.change(lambda connection: release(connection, "A-17", "all is well", "ada"))
             assert (await asyncio.to_thread(ask, "release", 1, "--reason", "answered")).exit_code == 0
             await inspected(records, 1, noise(side_px=320))
-            assert (await records.inspection(1)).images_state == messages.IMAGES_REMOVED()
+            assert read_record(records, 1).images_state == messages.IMAGES_REMOVED()
 
     scenario(steps)
     assert ask("holds").output == ""
@@ -125,9 +126,7 @@ def test_a_backup_while_the_station_writes_is_whole_and_can_be_put_back(
     async def goes_on():
         async with opened() as records:
             await inspected(records, 1, noise())
-            assert (await records.inspection(last + 1)).images_state == messages.IMAGES_KEPT(), (
-                "no number is given twice"
-            )
+            assert read_record(records, last + 1).images_state == messages.IMAGES_KEPT(), "no number is given twice"
 
     scenario(goes_on)
 
@@ -151,7 +150,7 @@ def test_a_fruit_that_ran_while_the_backup_was_made_has_no_invented_outcome_afte
             await records.acknowledged(2)
             assert await records.open_inspections() == OpenInspections((), ())
             await inspected(records, 1, noise())
-            assert (await records.inspection(3)).standing is not None
+            assert read_record(records, 3).standing is not None
 
     scenario(before)
     restore_backup(folder, tmp_path / "copy", "ada", public_keys_of(folder))
@@ -343,7 +342,7 @@ def test_a_check_finds_what_is_wrong_and_the_next_start_reconciles(
                     await asyncio.sleep(0.01)
                 states = []
                 while missing not in states:
-                    states = [(await records.inspection(number)).images_state for number in (1, 2, 3)]
+                    states = [read_record(records, number).images_state for number in (1, 2, 3)]
 
     scenario(again)
     with sqlite3.connect(folder / FILE_NAME) as database:
@@ -364,6 +363,6 @@ def test_images_that_are_all_away_are_not_forgotten(opened, scenario, inspected,
     async def again():
         async with opened() as records:
             await inspected(records, 1)
-            assert (await records.inspection(1)).images_state == messages.IMAGES_KEPT()
+            assert read_record(records, 1).images_state == messages.IMAGES_KEPT()
 
     scenario(again)

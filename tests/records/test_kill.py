@@ -9,6 +9,8 @@ import sys
 import threading
 from pathlib import Path
 
+from tests.stored_inspection import read_record
+
 WRITER = """
 import asyncio, json, os, sys
 from pathlib import Path
@@ -67,11 +69,11 @@ def test_a_killed_station_keeps_every_begun_inspection(opened, scenario, folder,
             for sequence in told["published"]:
                 assert ended[sequence].reasons == ("no_contact",), "what the PLC was told stands"
             for sequence in set(told["concluded"]) - set(told["published"]):
-                full = await records.inspection(sequence)
+                full = read_record(records, sequence)
                 assert full.judged is not None, "what was concluded is kept"
                 assert len(full.judged.curve) == 8
             for sequence in ended:
-                for image in (await records.inspection(sequence)).images:
+                for image in read_record(records, sequence).images:
                     assert (folder / "images" / image.sha256[:2] / f"{image.sha256}.png").exists()
             assert await records.begin(trigger) > max(ended)
 

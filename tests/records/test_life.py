@@ -15,6 +15,7 @@ from station.records.errors import BadRecordError, LockedError, RecordsClosedErr
 from station.records.lots import read_lots, start_lot
 from station.records.model import AlarmEntry, StoredAlarm
 from tests.records.causes import because
+from tests.stored_inspection import read_record
 
 
 def test_a_trigger_goes_its_way_from_begin_to_acknowledged(opened, scenario, trigger, failed):
@@ -34,7 +35,7 @@ def test_a_trigger_goes_its_way_from_begin_to_acknowledged(opened, scenario, tri
             assert await records.acknowledged(sequence) == 1
             assert await records.acknowledged(sequence) == 0
             assert await records.open_inspections() == type(await records.open_inspections())((), ())
-            full = await records.inspection(sequence)
+            full = read_record(records, sequence)
             assert full.judged == failed
             assert full.trigger == trigger
             assert full.standing == outcome
@@ -76,7 +77,7 @@ def test_the_first_conclusion_stands(opened, scenario, trigger, passed, failed):
             sequence = await records.begin(trigger)
             first = await records.conclude(sequence, failed)
             assert await records.conclude(sequence, passed) == first
-            assert (await records.inspection(sequence)).judged == failed
+            assert read_record(records, sequence).judged == failed
 
     scenario(steps)
 
@@ -101,7 +102,7 @@ def test_what_the_plc_was_told_overrules_what_was_judged(opened, scenario, trigg
             if told_first:
                 assert await records.conclude(sequence, passed) == told
             assert (await records.open_inspections()).ended == (told,)
-            full = await records.inspection(sequence)
+            full = read_record(records, sequence)
             assert full.standing == told
             assert full.judged == passed, "what was judged is kept beside it"
 
@@ -156,12 +157,12 @@ def test_a_restart_ends_what_was_not_surely_delivered(opened, scenario, trigger,
             ]
             assert was_open.ended[0].reasons == was_open.ended[1].reasons == (Reason.STATION_LOST,)
             assert was_open.ended[0].partial
-            assert (await records.inspection(judged)).judged == passed
-            assert (await records.inspection(running)).judged is None
+            assert read_record(records, judged).judged == passed
+            assert read_record(records, running).judged is None
             # the interface outlived the station, and had shown the outcome just before: that stands
             shown = Outcome(**dict[str, Any]({**was_open.ended[1].model_dump(), "outcome": "PASS", "reasons": ()}))
             assert await records.published(shown)
-            assert (await records.inspection(judged)).standing == shown
+            assert read_record(records, judged).standing == shown
 
     scenario(steps)
 
@@ -169,9 +170,11 @@ def test_a_restart_ends_what_was_not_surely_delivered(opened, scenario, trigger,
 def test_an_unknown_inspection_is_refused(opened, scenario, passed, trigger):
     async def steps():
         async with opened() as records:
-            for request in (records.conclude(1, passed), records.published(_told(1)), records.inspection(1)):
+            for request in (records.conclude(1, passed), records.published(_told(1))):
                 with pytest.raises(UnknownInspectionError):
                     await request
+            with pytest.raises(UnknownInspectionError):
+                read_record(records, 1)
             assert await records.begin(trigger) == 1, "a refused one takes no number"
 
     scenario(steps)
@@ -210,7 +213,7 @@ def test_an_odd_figure_costs_no_record(opened, scenario, trigger, passed):
         async with opened() as records:
             sequence = await records.begin(trigger)
             await records.conclude(sequence, replace(passed, measures={"slope": float("nan"), "note": "é\x00"}))
-            full = await records.inspection(sequence)
+            full = read_record(records, sequence)
             assert full.judged is not None
             assert full.judged.measures == {"slope": None, "note": "é\x00"}
 
@@ -334,7 +337,7 @@ def test_any_history_has_one_outcome_for_each_trigger(  # noqa: C901 (a model an
                 ended = {outcome.sequence: outcome.outcome for outcome in was_open.ended}
                 assert ended == {n: row[1] for n, row in model.items() if row[1] is not None and not row[3]}
                 for n, row in model.items():
-                    full = await records.inspection(n)
+                    full = read_record(records, n)
                     assert (full.judged.outcome if full.judged else None) == row[0]
 
     async def carry_out(records, verb, choice):

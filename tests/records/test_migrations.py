@@ -17,12 +17,14 @@ from station.messages import records as messages
 from station.messages.judge import AREA_UNKNOWN, CLOSING, CONTACT_LOST, NO_ONSET
 from station.messages.message import Message, joined, verbatim
 from station.outbox.feed import read_batch
-from station.records import database
-from station.records.database import FILE_NAME, MIGRATIONS, migrate, open_engine
+from station.records import migration
+from station.records.database import FILE_NAME, open_engine
 from station.records.errors import SchemaError
+from station.records.migration import MIGRATIONS, migrate
 from station.records.schema import metadata
 from station.records.stored_message import from_stored
 from tests.records.causes import because
+from tests.stored_inspection import read_record
 
 NEXT = """
 from alembic import op
@@ -51,7 +53,7 @@ def next_form(tmp_path, monkeypatch, head):
         folder = tmp_path / "migrations"
         shutil.copytree(MIGRATIONS, folder, ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True)
         (folder / "versions" / "9999_next.py").write_text(NEXT.format(then=then, head=head))
-        monkeypatch.setattr(database, "MIGRATIONS", folder)
+        monkeypatch.setattr(migration, "MIGRATIONS", folder)
 
     return use
 
@@ -115,7 +117,7 @@ def test_records_from_before_the_second_witness_read_without_it(opened, scenario
             await records.published(
                 await records.conclude(await records.begin(trigger), replace(passed, curve=with_witness))
             )
-            return [(await records.inspection(sequence)).judged.curve for sequence in (1, 2)]
+            return [read_record(records, sequence).judged.curve for sequence in (1, 2)]
 
     old, new = scenario(steps)
     assert old == passed.curve
@@ -150,7 +152,7 @@ def test_records_from_before_the_fruits_size_read_without_it(opened, scenario, f
         connection.close()
         async with opened() as records:
             await records.published(await records.conclude(await records.begin(sized), passed))
-            return [await records.inspection(sequence) for sequence in (1, 2)]
+            return [read_record(records, sequence) for sequence in (1, 2)]
 
     old, new = scenario(steps)
     assert (old.trigger, old.trigger.size) == (trigger, FruitSize())
@@ -192,7 +194,7 @@ def test_records_from_before_messages_read_with_their_sentences(opened, scenario
         connection.close()
         async with opened() as records:
             await records.published(await records.conclude(await records.begin(trigger), now))
-            return [(await records.inspection(sequence)).judged for sequence in (1, 2)]
+            return [read_record(records, sequence).judged for sequence in (1, 2)]
 
     old, new = scenario(steps)
     assert (old.explanation, old.judgement) == ((verbatim(area),), verbatim(judgement))
@@ -244,7 +246,7 @@ def test_a_newer_form_is_left_alone(opened, scenario, folder, trigger, next_form
             next_form()
             async with opened():
                 pass
-        monkeypatch.setattr(database, "MIGRATIONS", MIGRATIONS)
+        monkeypatch.setattr(migration, "MIGRATIONS", MIGRATIONS)
         before = (folder / FILE_NAME).read_bytes()
         with pytest.raises(SchemaError, match="9999", check=because(messages.NEWER_SCHEMA)):
             async with opened():

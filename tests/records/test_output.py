@@ -23,6 +23,7 @@ from station.records.queries import read_summaries
 from station.records.search import Query
 from tests.chromium import ARGUMENTS
 from tests.records.causes import because
+from tests.stored_inspection import read_record
 
 
 @pytest.fixture
@@ -108,7 +109,7 @@ def test_one_fruit_has_one_duration_in_every_output(opened, scenario, trigger, p
         async with opened() as records:
             [outcome] = [each for each in (await records.open_inspections()).ended if each.sequence == 3]
             await records.published(outcome)
-            return [InspectionDetails.of(await records.inspection(number)) for number in (1, 2, 3)]
+            return [InspectionDetails.of(read_record(records, number)) for number in (1, 2, 3)]
 
     scenario(judged_and_late)
     details = scenario(lost)

@@ -57,7 +57,7 @@ def test_a_rejected_fruit_is_explained(history, failed, folder):
 def test_what_the_plc_was_told_stands_beside_what_was_judged(history, ask):
     said = ask("show", 2).output
     assert "judged:       PASS, area 31.5 mm² (44500 px) at 4.02 mm of closing" in said
-    assert "stands:       NO_RESULT" in said
+    assert "in force:     NO_RESULT" in said
     assert f"called_off: {reason_message(Reason.CALLED_OFF)}" in said
 
 

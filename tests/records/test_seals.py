@@ -13,6 +13,7 @@ from station.messages import records as messages
 from station.records.database import FILE_NAME, open_engine, plain
 from station.records.schema import audit, curve_points, images, inspections, metadata
 from station.records.seals import append_skipped, begin_seals, check_seals, note_skipped, part_hash, seal
+from tests.stored_inspection import read_record
 
 UNEXPLAINED = "and the audit trail does not say why"
 
@@ -54,7 +55,7 @@ def test_what_the_station_does_itself_is_no_fault(
                 record = replace(failed, images=(noise(side_px=320, step=number),))
                 await records.published(await records.conclude(await records.begin(trigger), record))
                 await settled(records)
-            assert (await records.inspection(1)).images_state == messages.IMAGES_REMOVED()
+            assert read_record(records, 1).images_state == messages.IMAGES_REMOVED()
             outcome = await records.conclude(await records.begin(trigger), passed)
             late = outcome.model_copy(update={"outcome": "NO_RESULT", "reasons": (Reason.LATE,), "late": True})
             await records.published(late)

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from station.channel.line import Reason
 from station.messages import records as messages
 from station.messages.records import IMAGES_KEPT
-from station.records.database import FILE_NAME, migrate, open_engine, reading
+from station.records.database import FILE_NAME, open_engine, reading
 from station.records.errors import RecordsError
 from station.records.lots import end_lot, read_lots, start_lot
+from station.records.migration import migrate
 from station.records.model import RecipeSnapshot
 from station.records.search import Query, find, find_page
 from station.records.search_index import HOUR_MS

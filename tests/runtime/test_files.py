@@ -77,17 +77,17 @@ def test_a_file_is_there_whole_or_not_at_all(tmp_path):
 
 def test_a_start_whose_records_take_long_to_open_extends_its_limit(bench, tmp_path, monkeypatch):
     """The migration goes on until the supervisor has heard of it."""
-    migrate, heard = opening._migrate, []
+    migrate, heard = opening.migrate, []
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor:
         supervisor.bind(str(tmp_path / "notify"))
         supervisor.settimeout(60.0)
         monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
 
-        def long_migration(folder):
+        def long_migration(engine, folder):
             heard.append(supervisor.recv(4096).decode())
-            migrate(folder)
+            migrate(engine, folder)
 
-        monkeypatch.setattr(opening, "_migrate", long_migration)
+        monkeypatch.setattr(opening, "migrate", long_migration)
 
         async def start():
             async with bench():

@@ -1,4 +1,4 @@
-"""Alembic's environment: it runs the migrations on the connection that `station.records.database` hands over."""
+"""Alembic's environment: it runs the migrations on the connection that `station.records.migration` hands over."""
 
 from alembic import context
 

@@ -8,6 +8,7 @@ from station.channel.line import CommandName
 from station.inspection.states import State
 from station.press import motion, procedure
 from station.runtime.cycle import actions
+from tests.stored_inspection import read_record
 
 FRUIT, RIGHT_MM, DOWN_MM = 16, 1.0, 0.8
 TOUCHED_MM = 32.8
@@ -38,7 +39,7 @@ def test_the_arm_follows_the_first_contact_and_the_fruit_that_the_border_cut_pas
             cell.at(State.RECORDING_ACCEPT, lambda: sensor_mm.append(cell.twin.world.sensor_mm()))
             outcome = await cell.line.inspect()
             await cell.reach(State.IDLE)
-            record = await cell.station.service.registry.records.inspection(outcome.sequence)
+            record = read_record(cell.station.service.registry.records, outcome.sequence)
             return outcome, record.judged, sensor_mm, cell.twin.world.sensor_mm()
 
     outcome, judged, [sensor_mm], at_last = asyncio.run(scenario())

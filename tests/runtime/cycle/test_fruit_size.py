@@ -7,6 +7,7 @@ import pytest
 
 from station.inspection.fruit_size import FruitSize
 from station.settings.recipe import load_recipes
+from tests.stored_inspection import read_record
 
 NOT_GIVEN = FruitSize()
 
@@ -45,7 +46,7 @@ def test_wrong_and_stale_sizes_are_recorded_and_echoed_as_they_were_given(
             await asyncio.sleep(0.02)
         await plc.write({"control": 1})
         assert shown.trigger_id == trigger_id
-        record = await cell.station.service.registry.records.inspection(shown.sequence)
+        record = read_record(cell.station.service.registry.records, shown.sequence)
         outcomes[trigger_id] = (shown.outcome, tuple(shown.reasons))
         await plc.acknowledge(shown.sequence)
         return record.trigger.size, FruitSize(shown.fruit_length_mm, shown.size_class)

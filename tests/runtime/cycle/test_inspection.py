@@ -9,6 +9,7 @@ import pytest
 from station.inspection.states import State
 from station.twin.fruit import Kind, draw_fruit
 from station.vocabulary import Reason
+from tests.stored_inspection import read_record
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("strawberry", 3), ("raspberry", 4), ("blueberry", 1)])
@@ -30,7 +31,7 @@ def test_a_sound_fruit_is_measured_and_a_bruised_one_never_passes(bench, kind, s
                 cell.at(State.JUDGING, lambda bruised=bruised: truths.update({bruised: cell.twin.world.footprint()}))
                 outcomes.append(await cell.line.inspect())
             service = cell.station.service
-            return [(outcome, await service.registry.records.inspection(outcome.sequence)) for outcome in outcomes]
+            return [(outcome, read_record(service.registry.records, outcome.sequence)) for outcome in outcomes]
 
     (sound, record), (bruised, _) = asyncio.run(scenario())
     judged = record.judged
@@ -57,7 +58,7 @@ def test_what_cannot_be_measured_is_no_result(bench):
             touching = replace(draw_fruit(Kind.STRAWBERRY, 1), width_mm=56.0)
             cell.twin.world.place(touching)
             in_contact = await cell.line.inspect()
-            record = await cell.station.service.registry.records.inspection(in_contact.sequence)
+            record = read_record(cell.station.service.registry.records, in_contact.sequence)
             return empty, in_contact, record.judged.explanation
 
     empty, in_contact, explanation = asyncio.run(scenario())
@@ -78,7 +79,7 @@ def test_a_fruit_wider_than_the_jaws_where_the_images_begin_is_no_result(bench, 
             cell.station.service.set_active(type(active).of(recipe))
             monkeypatch.setattr(cell.station.recipes, "current", lambda active: active)  # the lot begins with this one
             outcome = await cell.line.inspect()
-            record = await cell.station.service.registry.records.inspection(outcome.sequence)
+            record = read_record(cell.station.service.registry.records, outcome.sequence)
             return outcome, record.judged
 
     outcome, judged = asyncio.run(scenario())
@@ -103,7 +104,7 @@ def test_an_early_stop_ends_the_closing_at_the_next_step_at_most(bench, monkeypa
             monkeypatch.setattr(cell.station.recipes, "current", lambda active: active)  # the lot begins with this one
             await cell.line.ready()
             outcome = await cell.line.inspect()
-            record = await service.registry.records.inspection(outcome.sequence)
+            record = read_record(service.registry.records, outcome.sequence)
             return outcome, record.judged.curve
 
     outcome, curve = asyncio.run(scenario())

@@ -14,6 +14,7 @@ from station.settings.gripper import GripperCalibration
 from station.settings.hmi import panel_endpoint
 from station.twin.fruit import Kind, draw_fruit
 from station.vocabulary import Reason, Refusal
+from tests.stored_inspection import read_record
 
 
 async def ready_with_arm(cell):
@@ -48,7 +49,7 @@ def test_a_trigger_is_accepted_while_the_arm_leaves_and_a_fault_then_gives_it_on
             await line.publish(second)
             assert (first.outcome, second.outcome) == ("PASS", "PASS")
             assert second.sequence == first.sequence + 1
-            record = await cell.station.service.registry.records.inspection(second.sequence)
+            record = read_record(cell.station.service.registry.records, second.sequence)
             assert {"retreating_accepted", "approaching"} <= set(record.judged.phases_s)
 
             await inspected_until_leaving(cell)

@@ -13,6 +13,7 @@ from station.records.database import records_folder
 from station.runtime.imaging import worker as vision_worker
 from station.vision.methods import make_method
 from station.vocabulary import Flag, Reason
+from tests.stored_inspection import read_record
 
 
 @pytest.fixture
@@ -56,7 +57,7 @@ def inspect(bench, settings_file):
                 async with asyncio.timeout(60):
                     while records.status().images_waiting:
                         await asyncio.sleep(0.05)
-                return outcome, await records.inspection(outcome.sequence)
+                return outcome, read_record(records, outcome.sequence)
 
         return asyncio.run(scenario())
 

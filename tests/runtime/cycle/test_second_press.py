@@ -11,6 +11,7 @@ from station.records.report import format_inspection
 from station.vocabulary import Reason
 from station.whatif.replay import recipe_of_snapshot, replay
 from station.whatif.stored import read_stored, snapshots
+from tests.stored_inspection import read_record
 
 FRUIT, OFF_MM = 16, 3.0
 """Where it lies, the border cuts it in every press; in the middle, in none, however long the flesh creeps."""
@@ -29,7 +30,7 @@ def inspected(bench, roomy):
                 openings = []
                 cell.at(State.OPENING_AGAIN, lambda: (openings.append(cell.phase), meanwhile(cell)))
                 outcome = await cell.line.inspect()
-                record = await cell.station.service.registry.records.inspection(outcome.sequence)
+                record = read_record(cell.station.service.registry.records, outcome.sequence)
                 return outcome, record, openings
 
         return asyncio.run(scenario())

@@ -11,6 +11,7 @@ from station.records.database import reading, records_folder
 from station.vocabulary import Reason
 from station.whatif.replay import recipe_of_snapshot, replay
 from station.whatif.stored import read_stored, snapshots
+from tests.stored_inspection import read_record
 
 
 @pytest.fixture
@@ -51,7 +52,7 @@ def inspected(bench, settings_file, tmp_path):
 
                 cell.at(State.MOVING, slowly)
                 outcome = await cell.line.inspect()
-                record = await cell.station.service.registry.records.inspection(outcome.sequence)
+                record = read_record(cell.station.service.registry.records, outcome.sequence)
                 return outcome, record
 
         return asyncio.run(scenario())

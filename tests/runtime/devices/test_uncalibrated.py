@@ -13,6 +13,7 @@ from station.messages import calibration
 from station.records.database import reading
 from station.records.search import Query, find_page
 from station.settings.configuration import Configuration
+from tests.stored_inspection import read_record
 
 NUMBER = ALARMS[AlarmId.CALIBRATION_OLD].number
 TRIGGER_AND_ENABLE = 3
@@ -63,7 +64,7 @@ def test_triggers_are_refused_with_the_remedy_until_the_sensor_is_calibrated(ben
 
             await until(ready, plc, cell)
             result = await plc.inspect(8, deadline_s=90)
-            record = await cell.station.service.registry.records.inspection(result.sequence)
+            record = read_record(cell.station.service.registry.records, result.sequence)
             assert made.id in record.judged.devices["calibration"]
             assert "uncalibrated" not in record.judged.measures
 
@@ -76,7 +77,7 @@ def test_where_it_is_allowed_each_record_states_it(bench):
         async with bench(uncalibrated="allow") as cell:
             await cell.choose("blueberry")
             outcome = await cell.line.inspect()
-            record = await cell.station.service.registry.records.inspection(outcome.sequence)
+            record = read_record(cell.station.service.registry.records, outcome.sequence)
             assert record.judged.measures["uncalibrated"] == "allow"
             assert record.judged.devices["calibration"].endswith("inspecting is allowed by service.uncalibrated")
             assert cell.station.service.alarms.alarms.get(AlarmId.CALIBRATION_OLD).state == "normal"

@@ -38,6 +38,7 @@ from station.settings.hmi import panel_endpoint
 from station.state_files import StateFiles
 from station.vocabulary import Reason, Refusal
 from tests.quick_recipes import NUMBERS
+from tests.stored_inspection import read_record
 
 IDA, BO = Person("Ida", "quality", "riper"), Person("Bo", "quality", "looked at lot 17")
 
@@ -70,7 +71,7 @@ def test_edits_and_approvals_within_a_lot_concern_the_next_one(bench):
             second = await cell.line.outcome(begun.sequence)
             await cell.line.publish(second)
             assert second.recipe_checksum != first.recipe_checksum
-            record = await cell.station.service.registry.records.inspection(second.sequence)
+            record = read_record(cell.station.service.registry.records, second.sequence)
             assert record.trigger.recipe.revision == "2"
 
             await asyncio.to_thread(store.retire, "blueberry", BO)
@@ -452,7 +453,7 @@ async def inspected(cell, trigger_id):
     begun = await begin(cell, trigger_id, "")
     assert begun.refusal is None, await cell.line.state()
     await cell.line.publish(await cell.line.outcome(begun.sequence))
-    return (await cell.station.service.registry.records.inspection(begun.sequence)).trigger
+    return read_record(cell.station.service.registry.records, begun.sequence).trigger
 
 
 async def at_panel(cell, request, reply):

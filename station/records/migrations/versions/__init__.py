@@ -1,1 +1,1 @@
-"""The migrations, one file a form of the database; never changed once released."""
+"""The migrations, one file per schema version; never changed once released."""
