@@ -70,9 +70,9 @@ async def tell(server: Server, home: Path, rows: int) -> tuple[float, dict[str, 
     names = [f"station-{number}" for number in range(STATIONS)]
     for name in names:
         fill(home / name, 1, each // 2, steps=4)
-    tellers = [Publisher(home / name, name, Postgresql(settings, name), longest_pause_s=1.0) for name in names]
+    publishers = [Publisher(home / name, name, Postgresql(settings, name), longest_pause_s=1.0) for name in names]
     began_s = time.perf_counter()
-    running = [asyncio.create_task(teller.run()) for teller in tellers]
+    running = [asyncio.create_task(publisher.run()) for publisher in publishers]
     try:
         writing = [asyncio.to_thread(fill, home / name, each // 2 + 1, each, 4) for name in names]
         troubled = asyncio.create_task(trouble(server))

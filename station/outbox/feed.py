@@ -85,17 +85,17 @@ def read_batch(folder: Path, station: str, after: int, limit: int = LARGEST_BATC
         first: dict[tuple[str, int], int] = {}
         for entry in entries:
             first.setdefault((entry.kind, entry.row), entry.entry)
-        told: list[Event] = []
+        events: list[Event] = []
         for kind, read in (("inspection", _inspections), ("lot", _lots), ("audit", _audit)):
             wanted = {row: entry for (of, row), entry in first.items() if of == kind}
             rows = read(connection, list(wanted))
-            told += [
+            events += [
                 Event(wanted[row], kind, {"station": station, "origin": lineage[0].id, "entry": wanted[row], **data})
                 for row, data in rows.items()
             ]
-        told.sort(key=lambda event: event.entry)
-        oldest = None if not told else _queued_utc_ms(connection, entries[0])
-    return Batch(lineage, tuple(told), entries[-1].entry if entries else after, last, oldest)
+        events.sort(key=lambda event: event.entry)
+        oldest = None if not events else _queued_utc_ms(connection, entries[0])
+    return Batch(lineage, tuple(events), entries[-1].entry if entries else after, last, oldest)
 
 
 def json_text(data: dict[str, Any]) -> str:

@@ -23,7 +23,12 @@ log = logging.getLogger(__name__)
 
 NAME = "mqtt"
 _TIMEOUT_S = 10
+"""Longest wait for the broker's answer, s; an estimate."""
+_KEEPALIVE_S = 20
+"""Longest silence before the client pings the broker, s; an estimate. After 1.5 times as long the broker publishes the
+last will."""
 _AT_LEAST_ONCE = 1
+"""MQTT's quality of service 1."""
 
 
 class Mqtt:
@@ -56,7 +61,7 @@ class Mqtt:
                 tls_context=ssl.create_default_context(cafile=settings.authority) if settings.tls else None,
                 will=aiomqtt.Will(online, b"false", _AT_LEAST_ONCE, retain=True),
                 timeout=_TIMEOUT_S,
-                keepalive=20,
+                keepalive=_KEEPALIVE_S,
             ) as client:
                 await client.publish(online, b"true", _AT_LEAST_ONCE, retain=True)
                 yield Session(client, root, self._folder / "mqtt.json")
@@ -75,17 +80,19 @@ class Session:
         self._kept: dict[str, int] = {}
         """By origin, also of those that are lost: a backup of one may be restored."""
 
-    async def position(self, lineage: Batch) -> int:
+    async def position(self, batch: Batch) -> int:
         """Return the last entry that was published; at the very first start the newest: history is not published."""
         try:
             self._kept = json.loads(self._path.read_bytes())
         except FileNotFoundError:
-            self._keep(lineage, lineage.last)
-            return lineage.last
+            self._keep(batch, batch.last)
+            return batch.last
         except (OSError, ValueError) as error:
             log.warning("%s: %s; publishing goes on with what is new", self._path, error)
-        known = lineage.known(self._kept)
-        return lineage.last if known is None and not self._kept else known or 0
+        known = batch.known(self._kept)
+        if known is not None:
+            return known
+        return 0 if self._kept else batch.last
 
     async def publish(self, batch: Batch) -> None:
         """Publish the entries after the position, each event after the broker has acknowledged the one before."""

@@ -131,12 +131,12 @@ class Session:
     def __init__(self, owner: Postgresql, connection: AsyncConnection[Any], station: str) -> None:
         self._owner, self._connection, self._station = owner, connection, station
 
-    async def position(self, lineage: Batch) -> int:
+    async def position(self, batch: Batch) -> int:
         """Return the last entry that the database has; 0 if it has none of this lineage."""
         query = "SELECT origin, last_entry FROM stations WHERE station = %s"
         rows = await (await self._connection.execute(query, (self._station,))).fetchall()
         await self._connection.commit()
-        return lineage.known(dict(rows)) or 0
+        return batch.known(dict(rows)) or 0
 
     async def publish(self, batch: Batch) -> None:
         """Write the entries after the position, and their position: all of it, or nothing."""

@@ -24,15 +24,17 @@ from station.settings.outbox import OutboxSettings
 log = logging.getLogger(__name__)
 
 FIRST_PAUSE_S = 0.5
+"""First pause between two attempts to connect, s; it doubles with each. An estimate."""
 LOOK_S = 0.5
 """Period of the search for new entries."""
 _STATUS_S = 2.0
+"""Period of the status file, s; an estimate."""
 
 
 class Session(Protocol):
     """An open connection to a destination."""
 
-    async def position(self, lineage: Batch) -> int:
+    async def position(self, batch: Batch) -> int:
         """Return the last entry that the destination has."""
         ...
 
@@ -109,7 +111,7 @@ class Publisher:
         origin, position = "", 0
         while True:
             batch = await self._read(position, LARGEST_BATCH)
-            if batch.lineage[0].id != origin:  # at the begin, and after a restoring
+            if batch.lineage[0].id != origin:  # at the start, and after a restore
                 origin, position = batch.lineage[0].id, await session.position(batch)
                 continue
             self._note(batch, position)
@@ -157,13 +159,13 @@ async def run_outbox(settings: OutboxSettings, home: Path, progress: Callable[[]
     """Publish to every destination until cancelled, and write the status; call `progress` while everything runs."""
     folder = records_folder(home)
     chosen = destinations(settings, home)
-    tellers = [Publisher(folder, settings.station, each, settings.longest_pause_s) for each in chosen]
+    publishers = [Publisher(folder, settings.station, each, settings.longest_pause_s) for each in chosen]
     async with asyncio.TaskGroup() as group:
-        for teller in tellers:
-            group.create_task(teller.run(), name=f"outbox {teller.destination.name}")
+        for publisher in publishers:
+            group.create_task(publisher.run(), name=f"outbox {publisher.destination.name}")
         while True:
             try:
-                status = {teller.destination.name: teller.status() for teller in tellers}
+                status = {publisher.destination.name: publisher.status() for publisher in publishers}
                 await asyncio.to_thread(write_status, outbox_folder(home), status)
             except OSError as error:
                 log.warning("the outbox's status cannot be written: %s", error)

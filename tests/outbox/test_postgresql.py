@@ -299,8 +299,8 @@ def test_the_process_tells_says_how_far_and_ends_in_order(server, fill, tmp_path
             time.sleep(0.1)
         assert rows(server, query) == [(40,)]
         said = command("outbox", "status", **site)
-        while "40 told, 0 wait" not in said.stdout and time.monotonic() < until_s:
+        while "40 published, 0 wait" not in said.stdout and time.monotonic() < until_s:
             said = command("outbox", "status", **site)
-        assert "postgresql: 40 told, 0 wait, 0 refused; connected" in said.stdout
+        assert "postgresql: 40 published, 0 wait, 0 refused; connected" in said.stdout
         process.send_signal(signal.SIGTERM)
         assert process.wait(LIMIT_S) == 0

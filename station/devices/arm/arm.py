@@ -22,11 +22,6 @@ class ArmState:
     fault: ArmFault | None
     """Fault that prevents motion; None if the arm is ready."""
 
-    @property
-    def ready(self) -> bool:
-        """Whether a motion may be requested."""
-        return self.fault is None
-
 
 class Arm(Protocol):
     """Arm that moves between named poses. A failure raises `ArmFault` with its cause and remedy."""

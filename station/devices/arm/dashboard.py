@@ -14,8 +14,11 @@ from station.messages import arm as messages
 
 PORT = 29999
 LINE_DEADLINE_S = 2.5
+"""Longest wait for a connection, and for each line of an answer, s; an estimate."""
 LONGEST_LINE = 4096
+"""Bytes of an answer's line at most; an estimate."""
 LONGEST_SHOWN = 160
+"""Characters of an answer that a message quotes at most."""
 
 
 @dataclass(frozen=True, slots=True)

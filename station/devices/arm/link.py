@@ -33,18 +33,27 @@ from station.messages.message import Message
 from station.settings.arm import ArmSettings
 
 BEAT_S = 0.1
+"""Period of the state's query while the link is up, s; an estimate."""
 BEAT_DEADLINE_S = 1.0
+"""Longest wait for the answer of a query, s; an estimate."""
 FIRST_PAUSE_S = 0.2
+"""Pause between two attempts to connect, s, doubled for each failure in a row; an estimate."""
 LONGEST_PAUSE_S = 3.0
+"""Longest pause between two attempts to connect, s; an estimate."""
 UPLOAD_TRIES = 3
 """Starts of a program that does not come to play, before a person is called."""
 SETTLE_S = 0.5
+"""Longest lag of RTDE behind the dashboard server, s; an estimate."""
 POLL_S = 0.01
+"""Period of the state's query within that lag, s; an estimate."""
 FIRST_LEASE_S = 2.0
+"""Health lease at the opening, s, until the caller renews it; an estimate."""
 END_AGAIN_S = 1.0
+"""Pause before a stop is sent again, s; an estimate."""
 PROCESS_START_LIMIT_S = 60.0
 """As the supervisor gives each of the station's processes."""
 SELF_HEALING = {ArmCause.LINK_LOST, ArmCause.STALE, ArmCause.DEADLINE}
+"""Causes that a new process may clear without a person."""
 
 log = logging.getLogger(__name__)
 

@@ -5,7 +5,7 @@ import contextlib
 import math
 import time
 from collections.abc import AsyncIterator
-from typing import Self
+from typing import Self, get_args
 
 from station.devices.arm.arm import ArmState
 from station.devices.arm.dashboard import DashboardConversation, dashboard
@@ -17,7 +17,9 @@ from station.messages import arm as messages
 from station.messages.message import Message
 from station.settings.arm import ArmSettings, PoseName
 
-POSES: tuple[PoseName, ...] = ("home", "above_nest", "nest", "accept", "reject")
+POSES: tuple[PoseName, ...] = get_args(PoseName)
+ARM_READY_S = 15.0
+"""Longest wait of a command for the arm to be ready, s; an estimate."""
 POLL_S = 0.02
 ARRIVING_POLL_S = 0.004
 """While the arm brakes into its place: two of the controller's cycles."""

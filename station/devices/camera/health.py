@@ -7,16 +7,27 @@ import numpy.typing as npt
 from station.devices.camera.interface import FrameFault, Image
 
 _BLACK_LEVEL = 16
+"""Grey level below which the brightest pixels of an image are black; an estimate."""
+_BRIGHTEST_PERCENT = 95
+"""Percentile of the pixels that counts as the brightest of an image; an estimate."""
 _SATURATED_LEVEL = 250
+"""Grey level from which a pixel counts as saturated; an estimate."""
 _SATURATED_SHARE = 0.2
+"""Largest share of saturated pixels in a good frame; an estimate."""
 _BLOCKS = 16
+"""Blocks along a line, whose means are compared from line to line."""
 _SEAM_HALF_PX = 2
+"""Lines on each side of a seam whose sums are compared."""
 _SEAM_RANKS = (3, 4)
 """Of the blocks along a line, between which the lowest quarter of 16 ends: a seam may be weak in those."""
 _SEAM_LEVELS = 6.0
 """Rendered frames of all fruit on many units stay below 3.6, torn and shifted ones above 8.8."""
+_SEAM_AROUND_PX = 20
+"""Lines on each side of a step, whose median it is compared with; an estimate."""
 _BASELINE_SHAPE = (40, 30)
+"""Rows and columns to which the frame before is reduced; an estimate."""
 _FITS_BETTER = 0.85
+"""A frame is shifted if the error after rolling it back is below this share of the error before; an estimate."""
 
 
 class FrameHealth:
@@ -46,7 +57,7 @@ class FrameHealth:
         if image.shape[:2] != self._shape:
             return frozenset(faults | {FrameFault.WRONG_SIZE})
         coarse = cv2.resize(image, _BASELINE_SHAPE[::-1], interpolation=cv2.INTER_AREA).astype(np.float32)
-        if np.percentile(coarse.max(axis=2), 95) < _BLACK_LEVEL:
+        if np.percentile(coarse.max(axis=2), _BRIGHTEST_PERCENT) < _BLACK_LEVEL:
             return frozenset(faults | {FrameFault.BLACK})
         if np.mean(coarse.max(axis=2) >= _SATURATED_LEVEL) > _SATURATED_SHARE:
             return frozenset(faults | {FrameFault.SATURATED})
@@ -95,5 +106,5 @@ def find_seam(image: Image, axis: int) -> int | None:
     low, high = np.moveaxis(np.partition(step, _SEAM_RANKS, axis=1)[:, _SEAM_RANKS], 1, 0)
     whole = (low + 3 * high) / 4
     place = int(np.argmax(whole))
-    around = np.median(whole[max(0, place - 20) : place + 21])
+    around = np.median(whole[max(0, place - _SEAM_AROUND_PX) : place + _SEAM_AROUND_PX + 1])
     return place + 3 * half if whole[place] - around > _SEAM_LEVELS else None

@@ -497,7 +497,7 @@ def test_the_device_check_claims_nothing_that_the_station_needs(bench, healthy, 
             assert claimed
             assert held
             assert not held & set(claimed)
-            assert (await arm.state()).ready
+            assert (await arm.state()).fault is None
 
     asyncio.run(run())
 
@@ -525,7 +525,7 @@ def test_a_hundred_connections_and_drops_leave_nothing_behind(bench, until):
             made.controller.network.cut()
 
             async def dropped() -> bool:
-                return not (await arm.state()).ready
+                return (await arm.state()).fault is not None
 
             await until(dropped)
 

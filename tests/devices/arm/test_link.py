@@ -26,7 +26,7 @@ def test_a_cut_link_in_mid_move_stops_the_arm_and_comes_back_by_itself(healthy_a
             assert await cause_of(move) is ArmCause.LINK_LOST
             state = await arm.state()
             assert state.joints_rad is None
-            assert not state.ready
+            assert state.fault is not None
             assert await cause_of(arm.stop()) is ArmCause.LINK_LOST
             await until(lambda: not bench.controller.body.moving)
             assert bench.controller.joints_rad[0] < 1.9
@@ -219,7 +219,7 @@ def test_an_arm_that_nobody_answers_for_is_a_fault_and_not_an_exception(host):
             assert await cause_of(arm.ready(1.0)) is ArmCause.LINK_LOST
             state = await arm.state()
             assert state.age_s is None
-            assert not state.ready
+            assert state.fault is not None
             assert await cause_of(arm.move_to("home")) is ArmCause.LINK_LOST
         assert await cause_of(arm.move_to("home")) is ArmCause.CLOSED
 

@@ -18,7 +18,7 @@ def test_it_goes_from_pose_to_pose_and_says_where_it_is(healthy_arm, until):
             for pose in ("above_nest", "nest", "above_nest", "accept", "accept"):
                 await arm.move_to(pose)
                 state = await arm.state()
-                assert state.ready
+                assert state.fault is None
                 assert state.at == pose
                 assert state.moving is False
                 await until(lambda: is_young(arm))
@@ -102,7 +102,7 @@ def test_a_stop_in_mid_move_brakes_and_ends_the_move(healthy_arm, until):
             assert await cause_of(move) is ArmCause.STOPPED
             assert not bench.controller.body.moving
             state = await arm.state()
-            assert state.ready
+            assert state.fault is None
             assert state.at is None
             await arm.stop()
             bench.faults.clear("slow")

@@ -102,7 +102,7 @@ def test_a_safety_fault_is_mended_by_a_restart_of_the_safety_system(healthy_arm,
             bench.faults.set("safety_fault")
             await until(lambda: has_cause(arm, ArmCause.SAFETY_FAULT))
             await arm.power_on_and_release_brakes()
-            assert (await arm.state()).ready
+            assert (await arm.state()).fault is None
 
     asyncio.run(run())
 
@@ -141,7 +141,7 @@ def test_what_waits_for_a_person_outlives_the_process(healthy_arm, until):
             assert await has_cause(arm, ArmCause.PROGRAM_STOPPED)
             assert bench.controller.script.runtime_state is RuntimeState.STOPPED
             await arm.upload_again()
-            assert (await arm.state()).ready
+            assert (await arm.state()).fault is None
 
     asyncio.run(run())
 
@@ -194,7 +194,7 @@ def test_what_forbids_the_connection_is_named(bench, fault, cause):
                 made.faults.clear(fault)
                 await asyncio.sleep(0.05)
                 await arm.upload_again()
-                assert (await arm.state()).ready
+                assert (await arm.state()).fault is None
 
     asyncio.run(run())
 
@@ -239,7 +239,7 @@ def test_a_station_that_is_not_healthy_any_more_has_its_arm_stopped_by_the_contr
             assert await cause_of(arm.move_to("home")) is ArmCause.WATCHDOG
             arm.renew_health(60.0)
             await arm.upload_again()
-            assert (await arm.state()).ready
+            assert (await arm.state()).fault is None
 
     asyncio.run(run())
 
