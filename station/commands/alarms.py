@@ -44,7 +44,7 @@ def listed(config: Path | None) -> None:
     """List the active alarms, most urgent first, with what to do; shelved ones come last."""
     found = asyncio.run(_ask(config, ListAlarms(), AlarmList)).alarms
     if not found:
-        click.echo("no alarm stands")
+        click.echo("no alarm is active")
     for each in sorted(found, key=lambda each: each.shelved_until_utc_ms is not None):
         click.echo(printable(_format(each)))
 

@@ -73,7 +73,7 @@ def calibrate(
     site = load_configuration(config)
     draft = _run(site, operator, places, bench=bench, yes=yes)
     folder = store_calibration(site, operator, draft)
-    _print_progress(draft.calibration.checks)
+    _print_checks(draft.calibration.checks)
     click.echo(f"calibration {draft.calibration.summary()}")
     click.echo(f"stored; look at {folder / PAGE}")
 
@@ -112,7 +112,7 @@ def _run(site: Configuration, operator: str, places: tuple[Place, ...], *, bench
         raise click.Abort from None
 
 
-def _print_progress(checks: tuple[Check, ...]) -> None:
+def _print_checks(checks: tuple[Check, ...]) -> None:
     for check in checks:
         click.echo(f"{'good' if check.passed else 'FAIL':6}{check.name:12}{check.found}")
 
@@ -161,7 +161,7 @@ def show_command(name: str, config: Path | None) -> None:
     click.echo(f"{calibration.serial}, {calibration.unit}, by {calibration.operator}")
     click.echo(calibration.summary())
     click.echo(f"onset {calibration.onset_mm:.2f} mm, the gripper's zero is off by {calibration.zero_mm:+.2f} mm")
-    _print_progress(calibration.checks)
+    _print_checks(calibration.checks)
     for verification in store.verifications(calibration.serial):
         if verification.calibration == calibration.id:
             verdict = "PASS" if verification.passed else "FAIL"

@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import os
-import signal
 import sys
 from collections.abc import AsyncIterator
 
@@ -12,7 +11,8 @@ import cv2
 
 from station.calibration.errors import CalibrationError
 from station.calibration.rig import Place, Progress, Unit
-from station.devices.arm.ur import UrArm
+from station.commands.signals import on_end_signals
+from station.devices.arm.ur import ARM_READY_S, UrArm
 from station.devices.camera.open import camera_from
 from station.devices.gripper.robotiq import make_gripper
 from station.errors import BadInputError
@@ -22,9 +22,8 @@ from station.records.open import lock_folder
 from station.runtime.devices.calibration_rig import CalibrationRig
 from station.runtime.devices.rig import Cell, renewed_lease
 from station.settings.configuration import Configuration
-from station.settings.recipe import Recipe, find_recipe
-
-_ARM_DEADLINE_S = 15.0
+from station.settings.recipe import find_recipe
+from station.settings.recipe_model import Recipe
 
 
 @contextlib.asynccontextmanager
@@ -65,7 +64,7 @@ async def open_rig(
         arm = None
         if not (bench or site.service.bench):
             arm = await stack.enter_async_context(UrArm(site.arm))
-            await arm.ready(_ARM_DEADLINE_S * site.service.patience)
+            await arm.ready(ARM_READY_S * site.service.patience)
             await stack.enter_async_context(renewed_lease(arm))
         if not yes:
             ball = f"the {site.calibration.ball_mm:g} mm ball lies in its holder"
@@ -106,8 +105,7 @@ def cancelled_by_signals() -> None:
     """Let Ctrl-C, and the signal that ends a service, cancel the calling task."""
     task = asyncio.current_task()
     assert task is not None  # noqa: S101 (called from a coroutine)
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        asyncio.get_running_loop().add_signal_handler(number, task.cancel)
+    on_end_signals(task.cancel)
 
 
 def show(progress: Progress) -> None:

@@ -57,7 +57,7 @@ def show(config: Path | None) -> None:
 
 @config.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--write", is_flag=True, help="Change FILE; without it, only what would be changed is said.")
+@click.option("--write", is_flag=True, help="Change FILE; without it, the changes are only printed.")
 def migrate(file: Path, *, write: bool) -> None:
     """Migrate FILE, a station.yaml of an earlier program, to this program's terms. Repeating it changes nothing.
 

@@ -2,7 +2,6 @@
 
 import asyncio
 import os
-import signal
 from pathlib import Path
 
 import click
@@ -16,6 +15,7 @@ from plc_interface.plc_simulator.scan import Scanner
 from plc_interface.plc_simulator.simulator import LineSimulator, Pace
 from plc_interface.registers.codec import WordOrder
 from station.commands.run import addresses
+from station.commands.signals import on_end_signals
 from station.commands.simulated_unit import calibrate_simulated_unit
 from station.errors import BadInputError, StationError
 from station.records.database import reading, records_folder
@@ -117,8 +117,7 @@ async def _run(
     site: Configuration, supervisor: Supervisor, nest: TwinNest, program: LineProgram, pace: Pace, count: int | None
 ) -> None:
     ended, ready = asyncio.Event(), asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        asyncio.get_running_loop().add_signal_handler(number, ended.set)
+    on_end_signals(ended.set)
     click.echo(f"starting the twin, the station, the PLC interface and the pages; their logs: {site.home / 'logs'}")
     supervising = asyncio.create_task(supervisor.run(ready.set, ended))
     waiting = asyncio.create_task(ready.wait())

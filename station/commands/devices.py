@@ -15,7 +15,7 @@ from station.commands.site import site_or_last_good
 from station.config_option import config_option
 from station.devices.arm.faults import ArmFault
 from station.devices.arm.probe import probe_arm
-from station.devices.arm.ur import UrArm
+from station.devices.arm.ur import ARM_READY_S, UrArm
 from station.devices.camera.probe import probe_camera
 from station.devices.check_result import CheckResult
 from station.devices.gripper.probe import probe_gripper
@@ -23,7 +23,6 @@ from station.errors import StationError
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.plc import line_endpoint
 
-_ARM_DEADLINE_S = 15.0
 _LEASE_S = 60.0
 _STATION_DEADLINE_S = 3.0
 _COLOURS = {"ok": "green", "warning": "yellow", "fault": "red"}
@@ -92,7 +91,7 @@ async def _recovered_by_the_station(configuration: Configuration, what: Recovery
 async def _recover_alone(configuration: Configuration, what: RecoveryName) -> None:
     async with UrArm(configuration.arm) as arm:
         with contextlib.suppress(ArmFault):  # being not ready is what brings a person here
-            await arm.ready(_ARM_DEADLINE_S)
+            await arm.ready(ARM_READY_S)
         arm.renew_health(_LEASE_S)
         match what:
             case "protective-stop":
@@ -101,7 +100,7 @@ async def _recover_alone(configuration: Configuration, what: RecoveryName) -> No
                 await arm.power_on_and_release_brakes()
             case _:
                 await arm.upload_again()
-        await arm.ready(_ARM_DEADLINE_S)
+        await arm.ready(ARM_READY_S)
 
 
 async def _check_devices(configuration: Configuration, *, bench: bool) -> list[CheckResult]:

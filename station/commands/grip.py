@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import csv
-import signal
 from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
@@ -13,8 +12,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from station.commands.signals import on_end_signals
 from station.config_option import config_option
-from station.devices.arm.ur import UrArm
+from station.devices.arm.ur import ARM_READY_S, UrArm
 from station.devices.camera.interface import Camera, Image
 from station.devices.camera.open import camera_from
 from station.devices.camera.twin import TwinCamera
@@ -25,11 +25,11 @@ from station.press.procedure import press
 from station.press.rig import MeasuredStep, Step
 from station.runtime.devices.rig import Cell, DeviceRig, renewed_lease
 from station.settings.configuration import Configuration, load_configuration
-from station.settings.recipe import Recipe, find_recipe
+from station.settings.recipe import find_recipe
+from station.settings.recipe_model import Recipe
 from station.vision.median import median_image
 from station.vision.methods import make_method
 
-_ARM_DEADLINE_S = 15.0
 _COLUMNS = ("image", "width_mm", "commanded_width_mm", "object_state", "current_a", "captured_s")
 
 
@@ -68,7 +68,7 @@ async def _grip(configuration: Configuration, recipe: Recipe, recording: "_Recor
         arm = None
         if not bench:
             arm = await stack.enter_async_context(UrArm(configuration.arm))
-            await arm.ready(_ARM_DEADLINE_S)
+            await arm.ready(ARM_READY_S)
 
         async with renewed_lease(arm):
             await press(DeviceRig(Cell(camera, gripper, arm), recipe), recipe, _Observer(recipe, camera, recording))
@@ -86,8 +86,7 @@ def _cancelled_by_signal() -> asyncio.Event:
         if task is not None:
             task.cancel()
 
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        asyncio.get_running_loop().add_signal_handler(number, call_off)
+    on_end_signals(call_off)
     return called_off
 
 

@@ -2,12 +2,12 @@
 
 import asyncio
 import contextlib
-import signal
 import time
 from pathlib import Path
 
 import click
 
+from station.commands.signals import on_end_signals
 from station.config_option import config_option
 from station.errors import StationError
 from station.logs import configure_logging
@@ -54,12 +54,12 @@ def status(config: Path | None) -> None:
             "" if each.oldest_utc_ms is None else f", the oldest for {time.time() - each.oldest_utc_ms / 1000:.0f} s"
         )
         connected = "connected" if each.connected else f"not connected: {each.error}"
-        click.echo(f"{name}: {each.told} told, {waiting}{oldest}, {each.refused} refused; {connected}")
+        click.echo(f"{name}: {each.told} published, {waiting}{oldest}, {each.refused} refused; {connected}")
     age_s = time.time() - said.utc_ms / 1000
     if age_s > LOST_S:
         raise StationError(f"the outbox was last heard {age_s:.0f} s ago; start `station run`, or `station outbox run`")
     if not all(each.connected for each in said.destinations.values()):
-        raise StationError("not all destinations are connected; what waits is told when they are")
+        raise StationError("not all destinations are connected; what waits is published when they are")
 
 
 async def _until_ended(site: Configuration) -> None:
@@ -69,8 +69,7 @@ async def _until_ended(site: Configuration) -> None:
         nonlocal heard_s
         heard_s = time.monotonic()
 
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        asyncio.get_running_loop().add_signal_handler(number, ended.set)
+    on_end_signals(ended.set)
     tasks = [
         asyncio.create_task(run_outbox(site.outbox, site.home, progress), name="outbox"),
         asyncio.create_task(feed_watchdog(lambda: time.monotonic() - heard_s < LOST_S), name="watchdog"),

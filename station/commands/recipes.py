@@ -18,7 +18,8 @@ from station.recipe_store.revision import Revision, Status
 from station.recipe_store.store import RecipeStore
 from station.settings.configuration import load_configuration
 from station.settings.problems import SettingsError, shortened, shortened_file
-from station.settings.recipe import Recipe, check_recipes, recipe_files
+from station.settings.recipe import check_recipes, recipe_files
+from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import content_sha256
 from station.settings.yaml_loader import parse_document
 
@@ -119,7 +120,7 @@ def diff(name: str, old: int | None, new: int | None, config: Path | None) -> No
         before = standing.control.recipe
     else:
         raise BadInputError(f"recipe {name}: none of its revisions is approved; name one with --from")
-    after = store.state(name).valid_file.recipe if new is None else store.revision(name, new).recipe
+    after = standing.valid_file.recipe if new is None else store.revision(name, new).recipe
     for difference in differences(before, after):
         click.echo(str(difference))
 
@@ -235,7 +236,7 @@ def upgrade(who: str, role: str, reason: str, config: Path | None) -> None:
     """Convert files of an earlier schema to this program's, comments included, with a backup. Idempotent."""
     done = _editor(config).upgrade(Person(who, role, reason))
     for path, form in done:
-        click.echo(f"{path}: form {form} upgraded")
+        click.echo(f"{path}: schema version {form} upgraded")
     click.echo(f"{len(done)} files were upgraded")
 
 
@@ -263,7 +264,7 @@ def _line(standing: RecipeState) -> str:
     """Format a recipe's state in one line."""
     control = standing.control
     force = "not in force" if control is None else f"revision {control.revision} in force"
-    known = control.recipe if control else standing.file.recipe if standing.file else None
+    known = standing.recipe
     what = "" if known is None else f", PLC number {known.plc_number}, {content_sha256(known)[:12]}"
     waits = (
         ""

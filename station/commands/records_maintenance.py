@@ -49,7 +49,7 @@ def lot() -> None:
 @lot.command("start")
 @click.argument("name")
 @click.option("--grower", metavar="NAME", required=True, help="Whose fruit it is.")
-@click.option("--correct", is_flag=True, help="Put this grower in the place of the one told before.")
+@click.option("--correct", is_flag=True, help="Replace the grower registered before.")
 @by_option
 @config_option
 def lot_start(name: str, grower: str, *, correct: bool, by: str, config: Path | None) -> None:

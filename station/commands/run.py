@@ -2,11 +2,11 @@
 
 import asyncio
 import logging
-import signal
 from pathlib import Path
 
 import click
 
+from station.commands.signals import on_end_signals
 from station.config_option import config_option
 from station.settings.configuration import Configuration
 from station.settings.hmi import address_of
@@ -31,8 +31,7 @@ def run(config: Path | None) -> None:
 
 async def _supervise(site: Configuration, config: Path | None) -> None:
     ended = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        asyncio.get_running_loop().add_signal_handler(number, ended.set)
+    on_end_signals(ended.set)
 
     def announce() -> None:
         click.echo(addresses(site))

@@ -1,11 +1,11 @@
 """`station service`: the station's own process."""
 
 import asyncio
-import signal
 from pathlib import Path
 
 import click
 
+from station.commands.signals import on_end_signals
 from station.config_option import config_option
 from station.logs import configure_logging
 from station.memory import keep_freed_memory
@@ -22,7 +22,7 @@ from station.settings.last_good import load_or_last_good
     type=click.Choice(["auto", "json", "human"]),
     default="auto",
     show_default=True,
-    help="The log.",
+    help="Style of the log lines.",
 )
 def service(config: Path | None, style: str) -> None:
     """Inspect fruit at the PLC's triggers, until SIGTERM or Ctrl-C. The arm and the gripper move.
@@ -37,8 +37,7 @@ def service(config: Path | None, style: str) -> None:
 async def _run(configuration: Configuration, broken: str) -> None:
     keep_freed_memory()
     station = Station(configuration, broken)
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        asyncio.get_running_loop().add_signal_handler(number, station.stop)
+    on_end_signals(station.stop)
     await station.run(lambda port: _announce(configuration, port))
 
 

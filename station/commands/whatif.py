@@ -13,7 +13,8 @@ from station.recipe_store.difference import Difference, differences
 from station.records.database import reading, records_folder
 from station.records.marks import Mark, read_marked
 from station.settings.configuration import load_configuration
-from station.settings.recipe import Recipe, find_recipe
+from station.settings.recipe import find_recipe
+from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import content_sha256
 from station.whatif.against_marks import Compared, compared
 from station.whatif.outcome_table import Counted, as_csv, counted
