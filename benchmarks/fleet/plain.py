@@ -5,8 +5,8 @@ HERE = f"$__timeFilter(began) AND {CHOSEN}"
 DAY = "date_trunc('day', began, '$__timezone')"
 FAILED = "count(*) FILTER (WHERE outcome = 'FAIL')::float / nullif(count(*) FILTER (WHERE outcome <> 'NO_RESULT'), 0)"
 UNJUDGED = "count(*) FILTER (WHERE outcome = 'NO_RESULT')::float / count(*)"
-GROWER = "coalesce(nullif(grower, ''), 'not told')"
-LOT = "coalesce(nullif(lot, ''), 'not told')"
+GROWER = "coalesce(nullif(grower, ''), 'not known')"
+LOT = "coalesce(nullif(lot, ''), 'not known')"
 
 STATEMENTS = {
     "Lots": f"""SELECT {LOT} AS lot, {GROWER} AS grower, fruit, station, min(began) AS began,

@@ -47,7 +47,7 @@ def _parser() -> argparse.ArgumentParser:
         "at any time, also after an interruption.",
     )
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("--rollback", action="store_true", help="take the last upgrade back")
+    what.add_argument("--rollback", action="store_true", help="roll the last upgrade back")
     what.add_argument("--undo", action="store_true", help="stop the station and take it away; its data are kept")
     parser.add_argument(
         "--purge", action="store_true", help="with --undo: remove configuration, records, copies and user too"

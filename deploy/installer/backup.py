@@ -26,7 +26,7 @@ A restore must not replace what is so now in the cell by what was so when the ba
 """
 RECORDS, STATE, SETTINGS = "records", "state", "settings"
 DAILY = "daily-"
-_DATABASE = Path("records.sqlite3")
+DATABASE = Path("records.sqlite3")
 
 
 def make_backup(layout: Layout, release: Path, kind: str) -> Path:
@@ -57,14 +57,14 @@ def _make_backup(layout: Layout, release: Path, kind: str) -> Path:
         shutil.rmtree(left, ignore_errors=True)
     partial.mkdir(mode=0o750)
     own(layout, partial, NAME, NAME)
-    has_records = (layout.home / RECORDS / _DATABASE).exists()
+    has_records = (layout.home / RECORDS / DATABASE).exists()
     if has_records:
         station(layout, release, "records", "backup", partial / RECORDS, limit_s=LONG_S)
     kept = [path.name for path in layout.home.iterdir() if path.name not in LEFT_OUT] if layout.home.is_dir() else []
     for name in kept:
         _copied(layout.home / name, partial / STATE / name)
     _copied(layout.settings, partial / SETTINGS)
-    if has_records and not (partial / RECORDS / _DATABASE).exists():
+    if has_records and not (partial / RECORDS / DATABASE).exists():
         raise Failed(f"{partial} has no records, so there is no backup: somebody removed them; make another")
     partial.rename(copy)
     # Made anew: where root makes the backup, it must not follow a link which the station's user has put there.
@@ -112,9 +112,9 @@ def _sequence(copy: Path) -> int:
 
 def schema_version(folder: Path) -> str:
     """Return a records' or backup's schema version, as its migrations name it; empty for none."""
-    if not (folder / _DATABASE).exists():
+    if not (folder / DATABASE).exists():
         return ""
-    with contextlib.closing(sqlite3.connect(folder / _DATABASE)) as connection:
+    with contextlib.closing(sqlite3.connect(folder / DATABASE)) as connection:
         row = connection.execute("SELECT version_num FROM alembic_version").fetchone()
     return str(row[0]) if row else ""
 

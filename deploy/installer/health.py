@@ -22,7 +22,7 @@ def ready(layout: Layout, release: Path) -> bool:
         return False
 
 
-def wait_until_well(
+def wait_until_healthy(
     layout: Layout,
     release: Path,
     version: str,
@@ -54,7 +54,7 @@ def wait_until_well(
         if not trouble:
             return
         time.sleep(0.5)
-    raise Failed(f"the station is not well {limit_s:g} s after its start: {trouble}")
+    raise Failed(f"the station is not healthy {limit_s:g} s after its start: {trouble}")
 
 
 def _trouble(address: tuple[str, int], version: str, *, was_ready: bool, needs_records: bool) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from installer import backup, configuration, preflight, site_files
-from installer.health import LIMIT_S, ready, wait_until_well
+from installer.health import LIMIT_S, ready, wait_until_healthy
 from installer.layout import Layout, point, read_note, target, write_note
 from installer.messages import Failed, Refused, print_progress
 from installer.release import ROOM_BYTES, STAMP, Packages, Source, complete, make
@@ -49,7 +49,6 @@ class Installation:
             Refused: it cannot be done.
         """
         preflight.check_machine(self._layout)
-        self._source.check()
         release_bytes = 0 if complete(self.release) else ROOM_BYTES
         if release_bytes or self.is_upgrade:
             preflight.check_disk_space(self._layout, release_bytes, migrates=self._migrates())
@@ -68,11 +67,11 @@ class Installation:
         """Return the steps in order. Each may be repeated; together they lead to the goal from any state between."""
         layout, name = self._layout, self.release.name
         upgrading = [
-            Step(f"see whether {layout.configuration} is good for {name}", self._try_configuration),
+            Step(f"check whether {layout.configuration} is valid for {name}", self._try_configuration),
             Step(f"copy records, state and configuration to {layout.backups}", self._make_backup),
-            Step("end the running station in order", self._services.stop),
+            Step("stop the running station", self._services.stop),
             Step(
-                f"bring {layout.configuration} into the words of {name}",
+                f"migrate {layout.configuration} to {name}",
                 lambda: configuration.migrate(layout, self.release),
             ),
         ]
@@ -81,8 +80,8 @@ class Installation:
             *(upgrading if self.is_upgrade else []),
             Step("put units, rules and the command `station` in place", lambda: site_files.put(layout, self.release)),
             Step(f"make the user, {layout.settings}, {layout.home} and {layout.backups}", self._make_places),
-            Step(f"have {layout.current} lead to {name}", lambda: point(layout.current, self.release)),
-            Step("start the station now and at each boot, and wait until it is well", self._start),
+            Step(f"point {layout.current} to {name}", lambda: point(layout.current, self.release)),
+            Step("start the station now and at each boot, and wait until it is healthy", self._start),
             Step("remove releases that are neither in use nor the one before", self._remove_old),
         ]
 
@@ -93,6 +92,7 @@ class Installation:
             Refused: the configuration is not valid in the new release; the old one runs on.
             Failed: a step failed. After a failed upgrade, the old release is in use again, or the text says why not.
         """
+        # From the stop of the old release until the new one is healthy, a failure rolls back.
         under_way = False
         for step in self.steps():
             print_progress(step.sentence)
@@ -145,7 +145,7 @@ class Installation:
         self._services.reload()
         self._services.enable()
         if self._services.start():
-            wait_until_well(
+            wait_until_healthy(
                 self._layout, self.release, self._source.version, was_ready=self._was_ready, limit_s=self._limit_s
             )
 

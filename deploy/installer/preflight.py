@@ -6,6 +6,7 @@ import shutil
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from installer import backup
 from installer.layout import Layout
 from installer.messages import Failed, Refused
 from installer.programs import station
@@ -42,12 +43,12 @@ def check_disk_space(layout: Layout, release_bytes: int, *, migrates: bool) -> N
     Raises:
         Refused: they do not.
     """
-    records = layout.home / "records"
+    records = layout.home / backup.RECORDS
     kept = [path for path in records.rglob("*") if path.is_file() and "aside" not in path.parts]
     records_bytes = sum(file.stat().st_size for file in kept)
     wanted = [(layout.program, release_bytes), (layout.backups, records_bytes)]
     if migrates:  # and a rollback restores the records beside those that were migrated
-        wanted.append((records, 2 * (records / "records.sqlite3").stat().st_size + records_bytes))
+        wanted.append((records, 2 * (records / backup.DATABASE).stat().st_size + records_bytes))
     disks: dict[int, tuple[Path, int]] = {}
     for path, size_bytes in wanted:
         place = next(parent for parent in (path, *path.parents) if parent.is_dir())
@@ -68,7 +69,7 @@ def check_no_lot(layout: Layout, release: Path) -> None:
     Raises:
         Refused: a lot is open, or a fruit was inspected within the last minutes.
     """
-    if not (layout.home / "records" / "records.sqlite3").exists():
+    if not (layout.home / backup.RECORDS / backup.DATABASE).exists():
         return
     try:
         lots = station(layout, release, "records", "lot", "list").splitlines()

@@ -6,10 +6,10 @@ import sqlite3
 from pathlib import Path
 
 from installer import backup, site_files
-from installer.health import LIMIT_S, wait_until_well
-from installer.layout import Layout, point, read_note, target
+from installer.health import LIMIT_S, wait_until_healthy
+from installer.layout import NAME, Layout, point, read_note, target
 from installer.messages import Failed, Refused, print_progress
-from installer.programs import own, station
+from installer.programs import LONG_S, own, station
 from installer.release import STAMP, complete
 from installer.services import Services
 
@@ -60,10 +60,10 @@ def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> N
             layout.configuration, layout.configuration.with_name(f"{layout.configuration.name}.rolled-back")
         )
         layout.configuration.write_text(before, encoding="utf-8")
-        own(layout, layout.configuration, "root", "fruit-station")
+        own(layout, layout.configuration, "root", NAME)
         print_progress(f"{layout.configuration} is as before the upgrade")
     if _restores(layout, copy):
-        station(layout, old, "records", "restore", copy / backup.RECORDS, limit_s=4 * 3600.0)
+        station(layout, old, "records", "restore", copy / backup.RECORDS, limit_s=LONG_S)
         print_progress(
             f"the records are as before the upgrade; what came since is in {layout.home / backup.RECORDS / 'aside'}"
         )
@@ -73,7 +73,7 @@ def roll_back(layout: Layout, services: Services, limit_s: float = LIMIT_S) -> N
     services.enable()
     if services.start():
         version = str(read_note(old / STAMP)["version"])
-        wait_until_well(layout, old, version, was_ready=False, needs_records=False, limit_s=limit_s)
+        wait_until_healthy(layout, old, version, was_ready=False, needs_records=False, limit_s=limit_s)
     layout.upgrade.unlink()
     layout.previous.unlink()
     print_progress(f"{old.name} is in use again")

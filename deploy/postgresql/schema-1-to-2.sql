@@ -1,6 +1,7 @@
 -- From version 1 of schema.sql to version 2, the fruit's size. Load it once, as the database's owner:
 --   psql --set ON_ERROR_STOP=1 --single-transaction --file schema-1-to-2.sql fruit
--- A station of the other version tells nothing meanwhile, and nothing is lost. Rows told before have no size here.
+-- A station of the other version publishes nothing meanwhile, and nothing is lost. Rows published before have no size
+-- here.
 
 ALTER TABLE inspections ADD COLUMN fruit_length_mm double precision, ADD COLUMN size_class integer;
 

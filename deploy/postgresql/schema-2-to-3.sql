@@ -1,6 +1,6 @@
 -- From version 2 of schema.sql to version 3, the summaries by hour and the audit trail's index without seals. Load it once, as the database's owner:
 --   psql --set ON_ERROR_STOP=1 --single-transaction --file schema-2-to-3.sql fruit
--- A station of the other version tells nothing meanwhile, and nothing is lost. It reads all inspections once, some
+-- A station of the other version publishes nothing meanwhile, and nothing is lost. It reads all inspections once, some
 -- minutes for a year of ten stations.
 
 LOCK TABLE inspections IN SHARE ROW EXCLUSIVE MODE;

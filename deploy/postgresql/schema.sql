@@ -9,8 +9,8 @@
 CREATE TABLE schema_version (version integer PRIMARY KEY);
 INSERT INTO schema_version VALUES (3);
 
--- What each station has told so far, by the database that counted. Written in the transaction of the rows themselves,
--- so that nothing is lost or doubled wherever a connection is cut.
+-- The last entry published by each station, by origin. Written in the transaction of the rows themselves, so that nothing
+-- is lost or doubled wherever a connection is cut.
 CREATE TABLE stations (
     station text NOT NULL,
     origin text NOT NULL,

@@ -410,15 +410,15 @@ def test_a_rollback_that_is_repeated_keeps_the_configuration_that_it_replaced(
     note = {"from": "0.1.0+test", "copy": "before-upgrade-1", "schema": "", "configuration": "# old\n"}
     installer("layout").write_note(upgraded.upgrade, note)
     upgraded.configuration.write_text("# new, and a person's\n")
-    answers = iter([failed("the station is not well"), None])
+    answers = iter([failed("the station is not healthy"), None])
 
     def wait(*_words, **_options):
         if (error := next(answers)) is not None:
             raise error
 
-    monkeypatch.setattr(rollback, "wait_until_well", wait)
+    monkeypatch.setattr(rollback, "wait_until_healthy", wait)
     services.start = lambda: True
-    with pytest.raises(failed, match="not well"):
+    with pytest.raises(failed, match="not healthy"):
         rollback.roll_back(upgraded, services)
     rollback.roll_back(upgraded, services)
     assert upgraded.configuration.read_text() == "# old\n"

@@ -46,7 +46,7 @@ def wait(installer, tmp_path, monkeypatch):
         with answering(answers) as port:
             shown = json.dumps({"metrics": {"host": "127.0.0.1", "port": port}})
             monkeypatch.setattr(health, "station", lambda *_words: shown)
-            health.wait_until_well(layout, tmp_path, "0.2.0", was_ready=was_ready, limit_s=1.0, **options)
+            health.wait_until_healthy(layout, tmp_path, "0.2.0", was_ready=was_ready, limit_s=1.0, **options)
 
     return run
 

@@ -11,15 +11,15 @@ ROWS = (
          (f"sum({UP})", "answer"), (f"count({UP})", "known"), width=6),
     prom("number", "Ready", "short", "How many would accept a trigger.", "metrics.md",
          (f"sum(station_ready{{{HERE}}})", "ready"), width=6),
-    prom("number", "Alarms", "short", "That stand now, by priority.", "alarms.md",
+    prom("number", "Alarms", "short", "Active alarms, by priority.", "alarms.md",
          (f"sum by (priority) (station_alarms_active{{{HERE}}})", "{{priority}}"), width=6),
-    prom("number", "Fruit a minute", "short", "By all of them.", "cycle-time.md",
+    prom("number", "Fruit a minute", "short", "Sum over all stations.", "cycle-time.md",
          (f"60 * sum(station:inspections:rate15m{{{HERE}}})", "fruit"), width=6),
 )  # fmt: skip
 COMPARED = (
     prom("lines", "Answers", "bool_yes_no", "0 is a machine that is off, or a network that is cut.", "reliability.md",
          (UP, "{{station}}"), largest=1),
-    prom("lines", "Alarms", "short", "How many stand.", "alarms.md",
+    prom("lines", "Alarms", "short", "Active alarms.", "alarms.md",
          (f"sum by (station) (station_priority:alarms_active:sum{{{HERE}}})", "{{station}}")),
     prom("lines", "Throughput", "short", "Fruit a minute.", "cycle-time.md",
          (f"60 * station:inspections:rate15m{{{HERE}}}", "{{station}}")),
@@ -33,7 +33,7 @@ COMPARED = (
          (f"station_fruit:unjudged_ratio:1h{{{HERE}}}", "{{station}}, {{fruit}}")),
     prom("lines", "Share of the deadline", "percentunit", "Of the slowest twentieth.", "alarms.md#deadline-missed",
          (f"station_fruit:cycle_share:p95_15m{{{HERE}}}", "{{station}}, {{fruit}}")),
-    prom("lines", "Drift of the reference", "suffix: grey levels", "Which sensor is next.",
+    prom("lines", "Drift of the reference", "suffix: grey levels", "The sensor with the largest drift is changed next.",
          "alarms.md#reference-drifting", (f"station_reference_drift_grey_levels{{{HERE}}}", "{{station}}")),
     prom("lines", "Free space", "bytes", "On the records' disks.", "alarms.md#disk-low",
          (f"station_records_free_bytes{{{HERE}}}", "{{station}}")),
@@ -47,7 +47,7 @@ COMPARED = (
 
 
 def dashboard() -> Any:
-    """The dashboard."""
+    """Return the dashboard."""
     station = chosen("station", "Stations", STATIONS, several=True)
     about = "Which station needs attention?"
     return board("fruit-fleet", "Fleet", about, (station,), {"Now": ROWS, "Side by side": COMPARED})

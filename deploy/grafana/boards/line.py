@@ -111,7 +111,7 @@ FRUIT = (
 
 
 def dashboard() -> Any:
-    """The dashboard."""
+    """Return the dashboard."""
     return board(
         "fruit-line", "Line", "How much is rejected, why, and is that usual?",
         (

@@ -16,8 +16,8 @@ FAILED = (
     "/ nullif(sum(inspections) FILTER (WHERE outcome <> 'NO_RESULT'), 0)"
 )
 UNJUDGED = f"coalesce(sum(inspections) FILTER (WHERE outcome = 'NO_RESULT'), 0)::float / {ALL}"
-GROWER = "coalesce(nullif(grower, ''), 'not told')"
-LOT = "coalesce(nullif(lot, ''), 'not told')"
+GROWER = "coalesce(nullif(grower, ''), 'not known')"
+LOT = "coalesce(nullif(lot, ''), 'not known')"
 
 
 def median(quantity: str, metric: str, unit: float, name: str) -> str:
@@ -98,7 +98,7 @@ REPLICATION = (
 
 
 def dashboard() -> Any:
-    """The dashboard."""
+    """Return the dashboard."""
     variables = (
         chosen("station", "Station", "SELECT DISTINCT station FROM stations ORDER BY 1", several=True),
         chosen("fruit", "Fruit", "SELECT DISTINCT fruit FROM hourly_outcomes WHERE fruit <> '' ORDER BY 1",

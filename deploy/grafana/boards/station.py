@@ -20,7 +20,7 @@ HEALTH = (
          (f"station_ready{{{HERE}}}", "ready"), width=4),
     prom("number", "Up since", "s", "How long the station's service has run.", "reliability.md",
          (f"time() - process_start_time_seconds{{{HERE}}}", "service"), width=4),
-    prom("number", "Alarms", "short", "How many stand, by priority.", "alarms.md",
+    prom("number", "Alarms", "short", "Active alarms, by priority.", "alarms.md",
          (f"sum by (priority) (station_alarms_active{{{HERE}}})", "{{priority}}"), width=8),
     prom("number", "Runs", "none", "The program's version and its Python.", "metrics.md",
          (f"station_build_info{{{HERE}}}", "{{version}}, Python {{python}}"), width=8),
@@ -109,7 +109,7 @@ OUTBOX = (
 MACHINE = (
     prom("lines", "Processor", "percentunit", "Of one core, by the service.", "cycle-time.md",
          (f"rate(process_cpu_seconds_total{{{HERE}}}[$__rate_interval])", "service")),
-    prom("lines", "Memory", "bytes", "Of the service; it should stand still after a day.", "reliability.md",
+    prom("lines", "Memory", "bytes", "Of the service; it should stay constant after a day.", "reliability.md",
          (f"process_resident_memory_bytes{{{HERE}}}", "service")),
     prom("lines", "Open files", "short", "Of the service; a number that only rises is a leak.", "reliability.md",
          (f"process_open_fds{{{HERE}}}", "service")),
@@ -117,8 +117,8 @@ MACHINE = (
 
 
 def dashboard() -> Any:
-    """The dashboard."""
+    """Return the dashboard."""
     rows = {"Health": HEALTH, "Cycle": CYCLE, "Sensor": SENSOR, "PLC": LINE, "Records": RECORDS, "Outbox": OUTBOX}
     station = chosen("station", "Station", STATIONS, several=False)
-    about = "Does this station do well, and if not, what of it?"
+    about = "Is this station healthy, and if not, which part is at fault?"
     return board("fruit-station", "Station", about, (station,), {**rows, "Machine": MACHINE})
