@@ -23,7 +23,8 @@ from station.calibration.verification_procedure import VerificationProcedure
 from station.press.procedure import take_step
 from station.press.reference import take_reference
 from station.settings.calibration import CalibrationSettings
-from station.settings.recipe import Recipe, find_recipe
+from station.settings.recipe import find_recipe
+from station.settings.recipe_model import Recipe
 from station.settings.segmentation import Segmentation
 from station.studies.simulated_rig import SimulatedRig
 from station.twin.digit.codec import Image

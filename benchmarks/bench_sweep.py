@@ -27,7 +27,8 @@ from station.inspection.sized_limits import sized_limits
 from station.inspection.uncertainty import budget_at
 from station.press.measurement import measured_point
 from station.press.stop import ends_steps, steps_to_decide
-from station.settings.recipe import Recipe, find_recipe
+from station.settings.recipe import find_recipe
+from station.settings.recipe_model import Recipe
 from station.studies.gauge_grip import FruitRig, Grip, Onset
 from station.studies.workers import on_this_machine
 from station.twin.gel import Gel

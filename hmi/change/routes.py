@@ -24,7 +24,7 @@ from station.channel.panel_run import (
     Recipes,
     RecipeSummary,
 )
-from station.settings.recipe import Recipe
+from station.settings.recipe_model import Recipe
 
 router = APIRouter()
 ENTRY = Entry("change", "/change")

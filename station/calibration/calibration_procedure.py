@@ -23,7 +23,7 @@ from station.errors import BadInputError
 from station.messages import calibration as messages
 from station.messages.message import Definition, Message
 from station.settings.calibration import CalibrationSettings
-from station.settings.recipe import Recipe
+from station.settings.recipe_model import Recipe
 from station.vision.contact import Image
 from station.vision.image_quality import light, sharpness
 from station.vision.scale import Scale

@@ -10,7 +10,7 @@ from station.calibration.press import Step
 from station.messages import calibration as messages
 from station.messages.message import Message, verbatim
 from station.settings.calibration import CalibrationSettings
-from station.settings.recipe import Recipe
+from station.settings.recipe_model import Recipe
 from station.vision.scale import TYPICAL_UNCERTAINTY
 
 ROUNDEST = 1.15

@@ -19,7 +19,7 @@ from station.press.procedure import bracketed_onset_mm, take_step
 from station.press.reference import reference_image, take_reference
 from station.press.rig import MeasuredStep
 from station.press.rig import Step as PressStep
-from station.settings.recipe import Recipe
+from station.settings.recipe_model import Recipe
 from station.vision.contact import Contact, Image
 from station.vision.methods import make_method
 from station.vocabulary import Flag

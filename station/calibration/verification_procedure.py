@@ -14,7 +14,7 @@ from station.calibration.rig import BallRig, OnProgress, Progress
 from station.calibration.store import press_name
 from station.messages import calibration as messages
 from station.settings.calibration import CalibrationSettings
-from station.settings.recipe import Recipe
+from station.settings.recipe_model import Recipe
 from station.vision.contact import Image
 
 _NOISE_FRAMES = 9

@@ -108,7 +108,7 @@ class RecipeSummary(RecipeNames):
     """Summary of a recipe in force."""
 
     values: str
-    """The recipe as JSON, to be read as `station.settings.recipe.Recipe`."""
+    """The recipe as JSON, to be read as `station.settings.recipe_model.Recipe`."""
 
 
 class DeviceView(ChannelMessage):

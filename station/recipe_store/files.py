@@ -5,7 +5,6 @@ import logging
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,6 +13,7 @@ from station.messages import recipes as messages
 from station.messages import settings as texts
 from station.recipe_store.recipe_state import ValidFile
 from station.recipe_store.revision import RecipeStoreError
+from station.records.database import stamp
 from station.settings.problems import Problem, SettingsError, shortened_file
 from station.settings.recipe import UNIQUE, check_recipes, load_recipe, recipe_files
 from station.settings.recipe_versions import parse_recipe
@@ -116,8 +116,7 @@ def prepared(path: Path, text: str, home: Path) -> Iterator[Callable[[], None]]:
     try:
         mode = None
         if path.exists():
-            stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
-            backup = home / BACKUPS / f"{path.stem}-{stamp}{path.suffix}"
+            backup = home / BACKUPS / f"{path.stem}-{stamp()}{path.suffix}"
             backup.parent.mkdir(parents=True, exist_ok=True)
             write_atomically(backup, path.read_bytes())
             mode = path.stat().st_mode & 0o777

@@ -36,7 +36,7 @@ class RecipeStore(RecipeReader):
             RecordsError: the history cannot be written.
         """
         found = {file.recipe.name: file for file in read_folder(self._folder).found}
-        if self._is_started() and not self._to_ship(list(found.values()), self.history()):
+        if self._has_begun() and not self._to_ship(list(found.values()), self.history()):
             return
         with locked(self._home), direct_transaction(self._records) as connection:
             _adopt(connection, found, last_good)
@@ -55,7 +55,7 @@ class RecipeStore(RecipeReader):
             file = self.state(name).valid_file
             if file.recipe.segmentation.method == "paper":
                 raise BadInputError(messages.NOT_FOR_INSPECTIONS(recipe=name))
-            self._started()
+            self._require_history()
             with direct_transaction(self._records) as connection:
                 return submit(connection, file.text, file.recipe, person)
 
@@ -87,7 +87,7 @@ class RecipeStore(RecipeReader):
             RecipeStoreError: it is retired already.
         """
         with locked(self._home):
-            self._started()
+            self._require_history()
             history = self.history(name)
             if revision is not None:
                 wanted = self.revision(name, revision)
@@ -113,25 +113,29 @@ class RecipeStore(RecipeReader):
                 wanted.append(file)
         return wanted
 
-    def _is_started(self) -> bool:
+    def _has_begun(self) -> bool:
         if not (self._records / FILE_NAME).exists():
             return False
         with reading(self._records) as connection:
-            return _has_started(connection)
+            return _history_has_begun(connection)
 
-    def _started(self) -> None:
-        """Adopt the existing recipes before a person's first change, unless that change is the adoption."""
-        if not self._is_started():
+    def _require_history(self) -> None:
+        """Refuse a person's change before the history has begun.
+
+        Raises:
+            RecipeStoreError: it has not begun.
+        """
+        if not self._has_begun():
             raise RecipeStoreError(messages.HISTORY_NOT_BEGUN())
 
 
-def _has_started(connection: Connection) -> bool:
+def _history_has_begun(connection: Connection) -> bool:
     return connection.exec_driver_sql("SELECT 1 FROM audit WHERE action = ? LIMIT 1", (BEGAN,)).first() is not None
 
 
 def _adopt(connection: Connection, found: Mapping[str, ValidFile], last_good: Mapping[str, Recipe]) -> None:
     """Begin the history, once."""
-    if _has_started(connection):
+    if _history_has_begun(connection):
         return
     shipped = approved_by_distribution()
     reason = str(messages.REASON_ADOPTED())

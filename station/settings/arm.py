@@ -1,4 +1,4 @@
-"""The robot arm: where it is, where it goes, how fast, and how long anything may take."""
+"""Arm settings: poses, speeds, tool and deadlines."""
 
 from math import pi
 from typing import Annotated, Literal, Self
@@ -57,7 +57,7 @@ ToolAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 
 
 class Centring(Settings):
-    """How the arm follows a contact that is off the field's middle, in the tool's own axes."""
+    """Centring: motion of the arm to a contact that is off the field's middle."""
 
     most_mm: float = setting(
         3.0,
@@ -87,7 +87,7 @@ class Centring(Settings):
         return self
 
     def in_tool_mm(self, right_mm: float, down_mm: float) -> tuple[float, float, float]:
-        """A way to the right and down in the image as a way along the tool's x, y and z."""
+        """Convert a distance right and down in the image to the tool's x, y and z, mm."""
         way = dict.fromkeys("xyz", 0.0)
         for (sign, axis), distance_mm in ((self.image_right, right_mm), (self.image_down, down_mm)):
             way[axis] = -distance_mm if sign == "-" else distance_mm
@@ -95,7 +95,7 @@ class Centring(Settings):
 
 
 class ArmSettings(Settings):
-    """The UR10e and the driver's patience with it."""
+    """Settings of the UR10e and its driver."""
 
     host: str = setting(
         "127.0.0.2",

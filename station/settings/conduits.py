@@ -18,7 +18,7 @@ ARM_PORTS = {
 
 
 class Zone(StrEnum):
-    """A group of machines with the same trust, and its distance from a hand that may be crushed."""
+    """Security zone: a group of machines with the same trust."""
 
     CELL = "cell"
     LINE = "line"

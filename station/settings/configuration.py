@@ -93,7 +93,7 @@ class Configuration(Settings):
         OutboxSettings(), title="Outbox", description="Other systems that receive inspections."
     )
     service: ServiceSettings = setting(
-        ServiceSettings(), title="Service", description="How the station inspects, and where its processes meet."
+        ServiceSettings(), title="Service", description="How the station inspects, and its deadlines."
     )
 
     @model_validator(mode="after")

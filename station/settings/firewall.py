@@ -5,8 +5,7 @@ from collections.abc import Iterable, Mapping
 
 from station.settings.conduits import Conduit, Zone, conduits
 from station.settings.configuration import Configuration
-
-LOOPBACK = ("127.0.0.0/8", "::1/128")
+from station.settings.modbus import LOOPBACK
 
 
 def rules(site: Configuration, zones: Mapping[Zone, tuple[str, ...]], maintenance: tuple[str, ...] = ()) -> str:

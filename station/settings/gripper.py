@@ -11,7 +11,7 @@ from station.settings.problems import FieldError
 
 
 class GripperCalibration(Settings):
-    """What one set of fingers makes of the gripper's position counts."""
+    """Position counts and millimetres of one set of fingers."""
 
     open_count: int = setting(
         3,

@@ -9,7 +9,7 @@ from station.messages import settings as messages
 from station.settings.model import Settings, setting
 from station.settings.network import Host, Port
 from station.settings.paths import File
-from station.settings.plc import channel_endpoint
+from station.settings.plc import ENDPOINT_PATTERN, channel_endpoint
 from station.settings.problems import FieldError
 
 Language = Literal["en", "de", "es"]
@@ -102,7 +102,7 @@ class HmiSettings(Settings):
         title="Station's endpoint",
         description="Where the station answers the pages: ipc://PATH or tcp://127.0.0.1:PORT; null for run/panel.ipc "
         "in the home folder.",
-        pattern=r"^(ipc://.+|tcp://127\..+:[0-9]+)$",
+        pattern=ENDPOINT_PATTERN,
         max_length=200,
     )
 

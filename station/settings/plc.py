@@ -10,6 +10,7 @@ from station.messages import settings as messages
 from station.settings.model import Settings, setting
 from station.settings.problems import FieldError
 
+ENDPOINT_PATTERN = r"^(ipc://.+|tcp://127\..+:[0-9]+)$"
 LONGEST_SOCKET_PATH = 107
 """Linux, unix(7): a socket's path with its closing NUL fits 108 bytes."""
 
@@ -22,7 +23,7 @@ class HandshakeSettings(Settings):
         title="Station's endpoint",
         description="Where the station answers the PLC interface: ipc://PATH or tcp://127.0.0.1:PORT; null for "
         "run/line.ipc in the home folder.",
-        pattern=r"^(ipc://.+|tcp://127\..+:[0-9]+)$",
+        pattern=ENDPOINT_PATTERN,
         max_length=200,
     )
     beat_period_s: float = setting(

@@ -16,8 +16,6 @@ from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import content_sha256, recipe_of
 from station.settings.yaml_loader import read_document
 
-__all__ = ["Checked", "Recipe", "check_recipes", "find_recipe", "load_recipe", "load_recipes", "recipe_files"]
-
 SUFFIXES = (".yaml", ".yml")
 UNIQUE = ("name", "plc_number")
 """Values by which a recipe is chosen: of two files with the same one, neither is used."""

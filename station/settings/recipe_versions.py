@@ -18,8 +18,8 @@ SCHEMA_VERSION = 1
 
 Migration = Callable[[MutableMapping[str, Any]], None]
 MIGRATIONS: Mapping[int, Migration] = {}
-"""By the form that each leads away from, to the next one; never changed once released. Each changes plain values, or a
-text's values with their comments, in place; `schema_version` is raised by the caller."""
+"""By the schema version that each migrates from, to the next one; never changed once released. Each changes plain
+values, or a text's values with their comments, in place; `schema_version` is raised by the caller."""
 
 
 def parse_recipe(text: str, source: str) -> Recipe:
@@ -67,20 +67,6 @@ def upgrade(values: MutableMapping[str, Any]) -> int | None:
         form += 1
         values["schema_version"] = form
     return found
-
-
-def rename(values: MutableMapping[str, Any], old: str, new: str) -> None:
-    """Rename a field, if it is there, in a migration: its place and, in a text, its comment are retained."""
-    if old not in values:
-        return
-    comments = getattr(getattr(values, "ca", None), "items", {})  # ruamel's, by key
-    comment = comments.pop(old, None)
-    entries = [(new if name == old else name, value) for name, value in values.items()]
-    for name in list(values):
-        del values[name]
-    values.update(entries)
-    if comment is not None:
-        comments[new] = comment
 
 
 def canonical_text(values: Mapping[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""Settings of the inspection: the processes' channel, deadlines, and limits of a good reference."""
+"""Service settings: placing, reset, deadlines, and limits of a good reference."""
 
 from typing import Literal
 
@@ -6,7 +6,7 @@ from station.settings.model import Settings, setting
 
 
 class ReferenceSettings(Settings):
-    """When a picture of the untouched gel is good enough to measure against."""
+    """Limits of a reference that is good enough to measure against."""
 
     oldest_s: float = setting(
         30.0,

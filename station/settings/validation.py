@@ -19,7 +19,7 @@ from station.settings.yaml_loader import Document
 Model = TypeVar("Model", bound=Settings)
 
 Locate = Callable[[Where], tuple[Message, Message]]
-"""Says where a value was written and what it is called there: `file:line` and `modbus.port`."""
+"""Returns the place of a value and its name there: `file:line` and `modbus.port`."""
 
 
 def validated(

@@ -7,7 +7,7 @@ import pytest
 
 from plc_interface.registers.map import REGISTERS
 from station.settings.configuration import Configuration
-from station.settings.recipe import Recipe
+from station.settings.recipe_model import Recipe
 from station.settings.schema import leaves, schema_of
 
 GUIDES = (

@@ -9,7 +9,7 @@ from station.settings import recipe_versions
 from station.settings.problems import SettingsError
 from station.settings.recipe import load_recipe
 from station.settings.recipe_text import with_values
-from station.settings.recipe_versions import SCHEMA_VERSION, content_sha256, parse_recipe, rename
+from station.settings.recipe_versions import SCHEMA_VERSION, content_sha256, parse_recipe
 
 GOLDEN = Path(__file__).parent / "golden"
 FORMS = sorted(GOLDEN.iterdir())
@@ -17,7 +17,17 @@ FORMS = sorted(GOLDEN.iterdir())
 
 def to_first_form(values):
     """A migration as a release would have it: one field got another name."""
-    rename(values["damage"], "growth", "growth_mm2_per_mm")
+    damage, old, new = values["damage"], "growth", "growth_mm2_per_mm"
+    if old not in damage:
+        return
+    comments = getattr(getattr(damage, "ca", None), "items", {})  # ruamel's, by key
+    comment = comments.pop(old, None)
+    entries = [(new if name == old else name, value) for name, value in damage.items()]
+    for name in list(damage):
+        del damage[name]
+    damage.update(entries)
+    if comment is not None:
+        comments[new] = comment
 
 
 @pytest.fixture
@@ -51,7 +61,7 @@ def test_an_earlier_form_is_read_and_written_back_with_its_comments_and_a_backup
     assert load_recipe(earlier_form).damage.growth_mm2_per_mm == 41
     assert station("recipes", "adopt")[0] == 0
     assert "strawberry: revision 1 in force" in station("recipes", "list")[1]
-    assert "strawberry.yaml: form 0 upgraded\n1 files were upgraded" in does("Ida", "upgrade")
+    assert "strawberry.yaml: schema version 0 upgraded\n1 files were upgraded" in does("Ida", "upgrade")
     after = earlier_form.read_text()
     assert "schema_version: 1\n" in after
     assert after.count("#") == before.count("#")

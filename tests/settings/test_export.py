@@ -9,7 +9,8 @@ from pydantic import ValidationError
 
 from station.settings.configuration import Configuration, load_configuration
 from station.settings.export import exported, recipe_table
-from station.settings.recipe import Recipe, load_recipe, load_recipes
+from station.settings.recipe import load_recipe, load_recipes
+from station.settings.recipe_model import Recipe
 from station.settings.schema import branches, leaves, resolved, schema_of
 
 

@@ -21,14 +21,8 @@ from station.settings import recipe_model
 from station.settings.damage import AreaUncertainty, Repeatability
 from station.settings.gripper import GripperCalibration
 from station.settings.problems import Problem, SettingsError
-from station.settings.recipe import (
-    Recipe,
-    approved_by_distribution,
-    approved_list,
-    find_recipe,
-    load_recipe,
-    load_recipes,
-)
+from station.settings.recipe import approved_by_distribution, approved_list, find_recipe, load_recipe, load_recipes
+from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import content_sha256
 from station.settings.validation import validated
 from station.settings.yaml_loader import parse_document

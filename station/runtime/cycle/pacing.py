@@ -13,7 +13,7 @@ from station.runtime.cycle.inspection import Inspection
 from station.runtime.devices.rig import Cell
 from station.settings.arm import ArmSettings, PoseName
 from station.settings.configuration import Configuration
-from station.settings.recipe import Recipe
+from station.settings.recipe_model import Recipe
 
 RECORD_NO_RESULT_S = 1.0
 """For a NO_RESULT to become durable, past the inspection's own deadline."""

@@ -7,7 +7,7 @@ from station.messages.message import Message
 from station.press.rig import GripError, Position
 from station.runtime.devices.rig import FRAME_DEADLINE_S, Cell, DeviceRig
 from station.settings.arm import PoseName
-from station.settings.recipe import Recipe
+from station.settings.recipe_model import Recipe
 
 WhyRefused = Callable[[], Message | None]
 """Returns why something may not be moved now; None where it may."""

@@ -19,7 +19,7 @@ from station.messages.message import Definition, Message
 from station.press.reference import are_open
 from station.press.rig import GripError, Position
 from station.settings.arm import PoseName
-from station.settings.recipe import Recipe
+from station.settings.recipe_model import Recipe
 
 FRAME_DEADLINE_S = 1.0
 """Longest wait for one frame, s: an estimate."""

@@ -19,7 +19,7 @@ from station.records.audit import STATION, AuditEntry
 from station.records.errors import RecordsError
 from station.records.model import RecipeSnapshot
 from station.settings.problems import SettingsError
-from station.settings.recipe import Recipe
+from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import content_sha256
 from station.state_files import StateFiles
 

@@ -43,7 +43,8 @@ from station.runtime.devices.calibration_rig import CalibrationRig
 from station.runtime.observability.audit_logger import AuditLogger, calibration_entry, verification_entry
 from station.runtime.production.production import Production
 from station.settings.configuration import Configuration
-from station.settings.recipe import Recipe, find_recipe
+from station.settings.recipe import find_recipe
+from station.settings.recipe_model import Recipe
 
 log = logging.getLogger(__name__)
 

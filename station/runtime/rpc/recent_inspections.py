@@ -20,7 +20,7 @@ from station.records.errors import RecordsError
 from station.records.judgement import limit_factor
 from station.records.model import InspectionRecord
 from station.runtime.cycle.inspection import Inspection
-from station.settings.recipe import Recipe
+from station.settings.recipe_model import Recipe
 from station.vision.contact import Mask
 
 MOST_IN_FULL = 24

@@ -28,7 +28,7 @@ from station.runtime.rpc.recent_inspections import (
     fruit_view,
     short_view,
 )
-from station.settings.recipe import Recipe
+from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import parse_recipe
 from station.vision.contact import Image
 
