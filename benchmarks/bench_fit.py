@@ -137,7 +137,7 @@ def fixed() -> None:
 def stages(runner: Runner) -> None:
     """Write the stages' table."""
     lines = [
-        "First the cost with all stages, then its change when one stage is left out: positive is what the stage earns.",
+        "First the cost with all stages, then its change when one stage is left out: positive is what the stage contributes.",
         "Data sets: mean of both parts; empty where nothing changes.",
         "",
         *stages_table(runner),
@@ -216,7 +216,7 @@ def main() -> None:
     parser.add_argument("--all", action="store_true", help="every part")
     parser.add_argument("--evaluate", action="store_true", help="the shipped constants on every data set")
     parser.add_argument("--sensitivity", action="store_true", help="what changing each constant costs")
-    parser.add_argument("--stages", action="store_true", help="what each stage earns")
+    parser.add_argument("--stages", action="store_true", help="what each stage contributes")
     parser.add_argument("--fit", action="store_true", help="search for better values; what runs without any option")
     parser.add_argument("--reliability", action="store_true", help="wrong areas by the least confidence")
     parser.add_argument("--reference", action="store_true", help="how far the reference check tells units apart")

@@ -1,4 +1,4 @@
-"""Stages: what each one earns, by the cost when it is left out, on every data set."""
+"""Stages: what each one contributes, by the cost when it is left out, on every data set."""
 
 from fit.cost import costs
 from fit.evaluation import Trial

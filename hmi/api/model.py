@@ -7,9 +7,9 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from hmi.past.past import FullRecord, judged_of
 from station.messages.message import Message
-from station.vocabulary import OutcomeName
+from station.vocabulary import LONGEST_LOT, OutcomeName
 
-LotName = Annotated[str, Field(min_length=1, max_length=32, pattern=r"^[ -~]*[!-~][ -~]*$")]
+LotName = Annotated[str, Field(min_length=1, max_length=LONGEST_LOT, pattern=r"^[ -~]*[!-~][ -~]*$")]
 """Printable ASCII, as in the PLC's registers."""
 Grower = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
 

@@ -32,7 +32,7 @@ from hmi.web.roles import Right
 from station.channel.panel import Actor, AlarmList, ListAlarms
 from station.channel.panel_lots import EndLot, LotView, Search, StartLot
 from station.channel.panel_maintenance import GetHealth, Health
-from station.vocabulary import OutcomeName, Reason
+from station.vocabulary import LONGEST_LOT, OutcomeName, Reason
 
 IN_SCHEMA = True
 _DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
@@ -97,7 +97,7 @@ async def alarms(hmi: HmiNow, _: Reader) -> AlarmAnswers:
 async def inspections(
     hmi: HmiNow,
     _: Reader,
-    lot: Annotated[str | None, Query(max_length=32, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")] = None,
+    lot: Annotated[str | None, Query(max_length=LONGEST_LOT, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")] = None,
     grower: Text | None = None,
     fruit: Text | None = None,
     outcome: OutcomeName | None = None,

@@ -4,6 +4,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from plc_interface.registers.map import BY_NAME
 from station.channel.line import Outcome
+from station.vocabulary import LONGEST_LOT
 
 COMMAND_RESULT = BY_NAME["command_result"]
 
@@ -18,7 +19,7 @@ class Running(_Persistent):
     sequence: int = Field(ge=1, lt=2**32)
     trigger_id: int = Field(ge=1, le=65_535)
     encoder: int = Field(ge=0, lt=2**32)
-    lot: str = Field(max_length=32)
+    lot: str = Field(max_length=LONGEST_LOT)
     fruit_length_mm_x10: int = Field(default=0, ge=0, le=65_535)
     size_class: int = Field(default=0, ge=0, le=65_535)
     within_s: float = Field(ge=0, allow_inf_nan=False)
@@ -52,7 +53,7 @@ class Journal(_Persistent):
     """The last inspection that the PLC acknowledged before its outcome was shown: a start does not make that right."""
     accepted_id: int = Field(default=0, ge=0, le=65_535)
     """The last trigger id accepted."""
-    lot: str = Field(default="", max_length=32)
+    lot: str = Field(default="", max_length=LONGEST_LOT)
     """The lot in force."""
     command_sequence: int | None = Field(default=None, ge=0, le=65_535)
     command_code: int | None = Field(default=None, ge=0, le=65_535)

@@ -18,6 +18,7 @@ from station.config_option import config_option
 from station.errors import BadInputError, StationError
 from station.settings.configuration import load_configuration
 from station.settings.recipe import load_recipes
+from station.vocabulary import LONGEST_LOT
 
 _ENDING_S = 0.5
 
@@ -43,7 +44,7 @@ _ENDING_S = 0.5
     metavar="MS",
     help="Milliseconds from scan to scan.",
 )
-@click.option("--lot", default="", help="Lot to latch, at most 32 ASCII characters.")
+@click.option("--lot", default="", help=f"Lot to latch, at most {LONGEST_LOT} ASCII characters.")
 @click.option("--separate", is_flag=True, help="Write and read by function codes 16 and 3 in place of 23.")
 @click.option(
     "--twin",
@@ -106,8 +107,8 @@ def line(
     number of them; 1 when it was ended before.
     """
     site = load_configuration(config)
-    if not (lot.isascii() and len(lot) <= 32 and (lot.isprintable() or not lot)):
-        raise BadInputError(f"--lot: expected at most 32 printable ASCII characters, got {lot!r}")
+    if not (lot.isascii() and len(lot) <= LONGEST_LOT and (lot.isprintable() or not lot)):
+        raise BadInputError(f"--lot: expected at most {LONGEST_LOT} printable ASCII characters, got {lot!r}")
     nest: Nest = RealNest()
     if console_port is not None:
         numbers = _numbers(kinds, site.recipes_folder)
