@@ -137,8 +137,8 @@ def fixed() -> None:
 def stages(runner: Runner) -> None:
     """Write the stages' table."""
     lines = [
-        "First the cost with all stages, then its change when one stage is left out: positive is what the stage contributes.",
-        "Data sets: mean of both parts; empty where nothing changes.",
+        "First the cost with all stages, then its change when one stage is left out: positive is what the stage",
+        "contributes. Data sets: mean of both parts; empty where nothing changes.",
         "",
         *stages_table(runner),
     ]

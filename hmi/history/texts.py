@@ -81,7 +81,7 @@ define("audit.recipe.file_noticed", "The file of the recipe {subject} was change
 define("audit.maintenance.jog", "Moved the fingers: {subject}.")
 define("audit.maintenance.leds", "Set the sensor's illumination.")
 define("audit.calibration.begun", "Began a run with the ball: {subject}.")
-define("audit.calibration.called_off", "Cancelled the run with the ball: {subject}.")
+define("audit.calibration.called_off", "Aborted the run with the ball: {subject}.")
 define("audit.calibration.stored", "Stored a calibration: {subject}.")
 define("audit.calibration.verified", "Verified the calibration: {subject}.")
 define("audit.images.held", "Retained the images: {subject}.")

@@ -244,9 +244,9 @@ class DamageThresholds(Settings):
         default="every_limit",
         title="Decided by",
         description="`every_limit` checks each area threshold. `every_trusted` checks each whose area is trusted, "
-        "and needs at least one. Where the last one's is not trusted because the contact may be larger than was seen, "
-        "the earlier ones decide, if the area is large enough for a fruit and the image is sound. `first_trusted` "
-        "takes the first whose area is trusted; later ones are for fruit whose area is not.",
+        "and needs at least one. Where the last threshold's area is not trusted because the contact may be larger than "
+        "was seen, the earlier thresholds decide, if the area is large enough for a fruit and the image is sound. "
+        "`first_trusted` takes the first whose area is trusted; later ones are for fruit whose area is not.",
     )
     growth_mm2_per_mm: float = setting(
         title="Growth threshold",

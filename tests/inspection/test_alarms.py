@@ -187,7 +187,7 @@ def test_what_stands_is_never_forgotten_and_what_is_over_ends(steps):
 
 
 @given(STEPS)
-def test_a_restart_remembers_them_all(steps):
+def test_stored_rows_give_the_same_alarms(steps):
     alarms, _, _ = played(steps)
     assert Alarms.restored(row(alarm) for alarm in alarms.known.values()) == alarms
 

@@ -1,6 +1,7 @@
 """The alarm manager: a cause that stays, what is found about it, and the alarm of each fault of the arm."""
 
 import asyncio
+import time
 from types import SimpleNamespace
 from typing import Any
 
@@ -40,6 +41,20 @@ def test_the_detail_of_a_devices_alarm_is_what_a_person_has_to_do_now():
     assert alarm.raised == 1
     manager.set_device_fault(GRIPPER, None)
     assert not manager.alarms.active
+
+
+def test_a_restart_restores_detail_and_shelf_of_an_alarm():
+    until_ms = round(1000 * time.time()) + 600_000
+
+    async def load_alarms():
+        return (StoredAlarm(AlarmId.DISK_LOW, "shelved", 2_000, 3_000, "2 GB left", until_ms, "Ida"),)
+
+    records: Any = SimpleNamespace(load_alarms=load_alarms, notices=())
+    manager = AlarmManager(Metrics("0", 1.0), to_restore=True)
+    asyncio.run(manager.restore(records))
+    alarm = manager.alarms.get(AlarmId.DISK_LOW)
+    assert (alarm.state, alarm.detail, alarm.since_s) == ("shelved", verbatim("2 GB left"), 2.0)
+    assert (alarm.shelved_until_s, alarm.shelved_by) == (until_ms / 1000, "Ida")
 
 
 OWN_ALARM = {
