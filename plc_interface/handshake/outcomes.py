@@ -79,7 +79,7 @@ def hide(work: Work, outcome: Outcome) -> None:
     journal = work.state.journal
     if outcome.sequence in journal.hidden:
         return  # and the station has noted it
-    work.log(f"inspection {outcome.sequence} belongs to a trigger that was refused: it is called off")
+    work.log(f"inspection {outcome.sequence} belongs to a trigger that was refused: it is aborted")
     work.durable = True
     disowned = list(journal.disowned)
     if outcome.trigger_id in disowned:

@@ -23,7 +23,7 @@ class StagedMethod:
         *,
         firm_only: bool = False,
     ) -> Contact:
-        """See `Method.measure`; `on_stage` has no part."""
+        """See `Method.measure`; `on_stage` is ignored: the pictures are in `pictures`."""
         self.pictures = {}
 
         def keep(name: str, picture: npt.NDArray[np.uint8]) -> None:

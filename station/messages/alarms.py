@@ -107,7 +107,7 @@ GRIPPER_JAM = AlarmTexts(
     define("alarm.action.gripper_jam", "Look for what blocks the fingers and take it out."),
 )
 CAMERA_LOST = AlarmTexts(
-    define("alarm.cause.camera_lost", "The tactile camera sends no frames, or frames that cannot be used."),
+    define("alarm.cause.camera_lost", "The tactile camera sends no frames, or frames of another protocol or size."),
     _REFUSED,
     define("alarm.action.camera_lost", "Check the camera's cable; the station connects again by itself."),
 )

@@ -18,7 +18,7 @@ NOTHING_TOUCHED = define(
     "nothing was touched from {largest_mm} down to {smallest_mm} mm: check that a fruit ({recipe}) is in the nest, "
     "and that the arm is there",
 )
-CALLED_OFF = define("grip.called_off", "the grip was called off")
+CALLED_OFF = define("grip.called_off", "the grip was aborted")
 NOT_OPENED = define(
     "grip.not_opened", "The gripper could not be opened, and the arm stays where it is: {reason}", reason=Nested()
 )

@@ -124,7 +124,7 @@ OVER_QUOTA = define(
 )
 QUOTA_FULL = define("records.quota_full", "the quota is full of images of rejected fruit, or on hold")
 DISK_NEARLY_FULL = define(
-    "records.disk_nearly_full", "the disk is nearly full, and what is left are images of rejected fruit or on hold"
+    "records.disk_nearly_full", "the disk is nearly full, and only images of rejected fruit, or on hold, are left"
 )
 REFERENCE_NOT_KEPT = define(
     "records.reference_not_kept",

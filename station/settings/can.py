@@ -116,7 +116,7 @@ class CanSettings(Settings):
     )
     tolerance_counts: int = setting(
         100,
-        title="Tolerance of a shot",
+        title="Tolerance of a reject",
         description="Largest distance of the reported from the ordered count; it has to cover the belt's way in "
         "one period of the encoder, 30 counts on the twin.",
         ge=0,

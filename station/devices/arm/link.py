@@ -43,9 +43,9 @@ LONGEST_PAUSE_S = 3.0
 UPLOAD_TRIES = 3
 """Starts of a program that does not come to play, before a person is called."""
 SETTLE_S = 0.5
-"""Longest lag of RTDE behind the dashboard server, s; an estimate."""
+"""Longest lag of RTDE behind the dashboard server, and longest wait for a started program to play, s; an estimate."""
 POLL_S = 0.01
-"""Period of the state's query within that lag, s; an estimate."""
+"""Period of the state's query after a program's start, s; an estimate."""
 FIRST_LEASE_S = 2.0
 """Health lease at the opening, s, until the caller renews it; an estimate."""
 END_AGAIN_S = 1.0

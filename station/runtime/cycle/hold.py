@@ -39,7 +39,8 @@ class Hold:
         await asyncio.wait({storing}, timeout=_DEADLINE_S)
         if not storing.done():
             log.warning(
-                "the disk is slow: if the process is killed now, the next start does not know of %s", self.event
+                "the disk is slow: if the process is killed now, the next start does not know of %s",
+                self.event or "the end of the hold",
             )
             self._late.add(storing)
             storing.add_done_callback(self._late.discard)

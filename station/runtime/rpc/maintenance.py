@@ -183,7 +183,11 @@ class PanelMaintenance:
         return LedsSet()
 
     async def live_image(self, request: GetLiveImage) -> LiveImage:
-        """Return the newest image; its contact is measured as in an inspection, and only while nothing is inspected."""
+        """Return the newest image with its contact.
+
+        The contact is measured with the unit's detection threshold, as in an inspection, but against the golden
+        reference, and only while nothing is inspected.
+        """
         frame = await self._devices.cell.camera.frame(request.newer_than_s, LIVE_IMAGE_DEADLINE_S)
         active = self._service.active
         why = None

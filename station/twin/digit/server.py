@@ -39,7 +39,7 @@ def digit_faults() -> FaultBoard:
 
     | fault | meaning | amount |
     |---|---|---|
-    | off | connections refused and cut | none |
+    | off | every connection is cut at once | none |
     | intermittent | every connection is cut each time a period has passed | the period, s |
     | stuck | the same pixels under new sequence numbers | none |
     | garbage | random bytes | none |
