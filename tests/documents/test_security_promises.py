@@ -1,8 +1,9 @@
 """Promises of the security page: each has a test that is there."""
 
+import ast
 import re
 
-REFERENCE = re.compile(r"`(tests/[\w/]+\.py)(?:::(\w+))?`")
+REFERENCE = re.compile(r"`(tests/[\w/]+\.py)(?:::(\w+))?::(\w+)`")
 
 
 def test_every_promise_has_a_test_that_is_there(root):
@@ -12,5 +13,9 @@ def test_every_promise_has_a_test_that_is_there(root):
     for row in rows:
         references = REFERENCE.findall(row)
         assert references, row
-        for file, name in references:
-            assert re.search(rf"def {name}\b" if name else r"def test_", (root / file).read_text()), (file, name)
+        assert len(references) == row.count("`tests/"), f"a whole file promises nothing: {row}"
+        for file, group, name in references:
+            tests = ast.parse((root / file).read_text()).body
+            if group:
+                [tests] = [each.body for each in tests if isinstance(each, ast.ClassDef) and each.name == group]
+            assert name in {each.name for each in tests if isinstance(each, ast.FunctionDef)}, (file, group, name)
