@@ -235,8 +235,8 @@ def import_one(file: Path, base: str, who: str, role: str, reason: str, config: 
 def upgrade(who: str, role: str, reason: str, config: Path | None) -> None:
     """Convert files of an earlier schema to this program's, comments included, with a backup. Idempotent."""
     done = _editor(config).upgrade(Person(who, role, reason))
-    for path, form in done:
-        click.echo(f"{path}: schema version {form} upgraded")
+    for path, version in done:
+        click.echo(f"{path}: schema version {version} upgraded")
     click.echo(f"{len(done)} files were upgraded")
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 RELATIVE_NOISE = 0.05
-"""By how much of itself an area may fall while the gripper closes before its step is called wrong; docs/measurement.md
-has the method's median errors, 0.04 to 0.06 on smooth fruit. The guard band of a limit is in uncertainty.py."""
+"""By how much of itself an area may fall while the gripper closes before its step is called wrong: an estimate, over
+the method's median error on smooth bodies (docs/measurement.md). The guard band of a limit is in uncertainty.py."""
 
 
 @dataclass(frozen=True, slots=True)
