@@ -79,7 +79,7 @@ class Job:
 
     @property
     def open(self) -> bool:
-        """Whether the job is not finished."""
+        """True until the job is finished."""
         return self.state in {"waiting", "running"}
 
     @property

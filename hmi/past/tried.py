@@ -34,7 +34,7 @@ class Error(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """What a draft would have decided."""
+    """Counts of past fruit that were diverted, and would be by a draft, with their comparison with people's marks."""
 
     last: int
     """Latest judged fruit."""

@@ -31,7 +31,7 @@ Forms: TypeAlias = tuple[str, ...]
 
 
 class Finding(NamedTuple):
-    """What is to be done about one text in one language."""
+    """Text of one language, or its whole catalogue, that needs work, and the reason."""
 
     file: Path
     id: str
@@ -71,7 +71,7 @@ def _extracted(path: Path) -> dict[str, Forms]:
 
 
 def _is_text(english: str) -> bool:
-    """Whether there is something to translate beside the values in braces."""
+    """Return whether there is something to translate beside the values in braces."""
     return any(letter.isalpha() for letter in english.format_map(defaultdict(str)))
 
 

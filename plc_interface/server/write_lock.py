@@ -49,7 +49,7 @@ class WriteLock:
         return True
 
     def owned_by(self, peer: Peer) -> bool:
-        """Whether this connection has the right to write."""
+        """Return whether this connection has the right to write."""
         return self.holder is peer
 
     def expire(self, now_s: float) -> None:

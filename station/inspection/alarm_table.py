@@ -9,7 +9,7 @@ from station.messages.message import Message
 
 
 class Priority(StrEnum):
-    """How soon an operator has to act; the fewer the higher."""
+    """Priority of an alarm: how soon an operator has to act; the higher it is, the fewer alarms have it."""
 
     CRITICAL = "critical"
     HIGH = "high"
@@ -80,17 +80,17 @@ class AlarmRow(NamedTuple):
 
     @property
     def cause(self) -> Message:
-        """What is wrong."""
+        """Cause of the alarm: what is wrong."""
         return self.texts.cause()
 
     @property
     def consequence(self) -> Message:
-        """What it means for the fruit or the line."""
+        """Consequence of the alarm for the fruit or the line."""
         return self.texts.consequence()
 
     @property
     def action(self) -> Message:
-        """What an operator does."""
+        """Action that an operator has to take."""
         return self.texts.action()
 
 

@@ -112,11 +112,11 @@ class Alarm:
     shelved_by: str = ""
 
     def chatters(self, now_s: float) -> bool:
-        """Whether it comes and goes too often to be published each time."""
+        """Return whether the alarm comes and goes too often to be published each time."""
         return len(self.raises_s) == CHATTER_RAISES and now_s - self.raises_s[0] < CHATTER_S
 
     def over(self, now_s: float) -> bool:
-        """Whether nothing about it matters any more."""
+        """Return whether the alarm can be dropped: it is normal, and was not raised within the chattering time."""
         return self.state == AlarmState.NORMAL and not any(0 <= now_s - raised < CHATTER_S for raised in self.raises_s)
 
 
@@ -198,7 +198,7 @@ class Alarms:
         return tuple(sorted(not_normal, key=lambda alarm: (urgency(alarm.id)[0], alarm.since_s, urgency(alarm.id)[1])))
 
     def annunciated(self) -> tuple[Alarm, ...]:
-        """What an operator sees, most urgent first."""
+        """Return the alarms in an operator's list, most urgent first."""
         return tuple(alarm for alarm in self.not_normal if alarm.state in SHOWN)
 
     @property

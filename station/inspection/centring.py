@@ -12,7 +12,7 @@ class Way(NamedTuple):
 
     @property
     def length_mm(self) -> float:
-        """How far it is."""
+        """Length of the way, mm."""
         return hypot(self.right_mm, self.down_mm)
 
     def then(self, other: "Way") -> "Way":
@@ -30,5 +30,5 @@ def off_middle(centroid_px: tuple[float, float], shape: tuple[int, ...], mm_per_
 
 
 def too_far(off: Way, moved: Way, most_mm: float) -> bool:
-    """Whether the sensor, moved from its taught place, may not follow a contact off the middle: beyond `most_mm`."""
+    """Return whether a contact off the middle is further than `most_mm` from the sensor's taught place."""
     return moved.then(off).length_mm > most_mm

@@ -372,11 +372,11 @@ class Cycle:
 
     @property
     def facts(self) -> StateFacts:
-        """What the state means outside."""
+        """Facts of the present state for the PLC and the operator."""
         return STATES[self.state]
 
     def leads_to(self, event: Event) -> Transition | None:
-        """Where an event would lead now, with nothing changed; None where it would be refused."""
+        """Return the transition that an event would cause now, with nothing changed; None where it would be refused."""
         return TABLE.get((self.state, event))
 
     def on(self, event: Event) -> tuple[Act, ...] | None:

@@ -114,7 +114,7 @@ def _top(row: int) -> float:
 
 
 def _near(start: State, end: State) -> bool:
-    """Whether an arrow is short enough to be followed."""
+    """Return whether an arrow is short enough to be followed: within a column, or to an adjacent box."""
     (column, row), (to_column, to_row) = PLACES[start], PLACES[end]
     return column == to_column or (abs(column - to_column) == 1 and abs(row - to_row) < 2)
 

@@ -52,12 +52,12 @@ class Growth:
 
     @property
     def least_mm2_per_mm(self) -> float:
-        """What it is at least."""
+        """Lower bound of the growth, mm² per mm: the value less its uncertainty."""
         return self.mm2_per_mm - self.uncertainty_mm2_per_mm
 
     @property
     def most_mm2_per_mm(self) -> float:
-        """What it may be."""
+        """Upper bound of the growth, mm² per mm: the value plus its uncertainty."""
         return self.mm2_per_mm + self.uncertainty_mm2_per_mm
 
 
@@ -110,7 +110,7 @@ class Evidence:
         return [point for point in self.needed if self.doubts(point) and self.doubts(point) <= EXCUSABLE]
 
     def bounds(self, point: Measured) -> bool:
-        """Whether the area is surely no smaller: a contact that the border cuts, or whose edge was lost, is larger."""
+        """Return whether the area is surely no larger than the contact: an edge cut or lost makes it smaller."""
         return self.doubts(point) <= LOWER_BOUNDS and point not in self.falling
 
     def doubts(self, point: Measured) -> frozenset[Flag]:

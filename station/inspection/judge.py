@@ -153,14 +153,14 @@ def judge(press: Press, recipe: Recipe) -> Judgement:
 
 
 def early_stop(press: Press, recipe: Recipe) -> Stop | None:
-    """Whether no further step is to be made: to spare fruit and gel, or since nothing could change any more.
+    """Return the reason to make no further step: to spare fruit and gel, or since nothing could change any more.
 
     Args:
         press: what was measured so far; also what is not trusted counts.
         recipe: its early stop's limits, its closing limit, and whether it stops when decided.
 
     Returns:
-        Why; None where the next step may be made.
+        None where the next step may be made.
     """
     return _case(press, recipe).stopped
 
@@ -209,22 +209,22 @@ class _Case:
 
     @property
     def proves(self) -> bool:
-        """Whether damage is proven: nothing is where the press is void."""
+        """True if damage is proven; never where the press is void."""
         return not self.void and any(finding.proves for finding in self.findings)
 
     @property
     def reached(self) -> bool:
-        """Whether the last limit's closing was reached."""
+        """True if the last limit's closing was reached."""
         return self.evidence.area_at(self.limits.recipe.damage.area[-1].closing_mm) is not None
 
     @property
     def may_be_over(self) -> bool:
-        """Whether an area that is a lower bound may pass its limit already; what was not seen only adds to it."""
+        """True if an area that is a lower bound may exceed its limit already; what was not seen only adds to it."""
         return {Reason.NEAR_LIMIT} < self._reasons <= {Reason.NEAR_LIMIT, *_LARGER} and self._doubts <= LOWER_BOUNDS
 
     @property
     def may_be_larger(self) -> bool:
-        """Whether nothing is in doubt but that the contact may reach further than was seen, and the limits are kept.
+        """True if the limits are kept and nothing is in doubt but that the contact may reach further than was seen.
 
         An area too small for any fruit, a wrong reference or a saturated image speak against the whole press, and so
         do areas that do not rise.
@@ -236,7 +236,7 @@ class _Case:
 
     @property
     def decides(self) -> bool:
-        """Whether damage is proven, or the last limit was reached and nothing is in doubt but how near it is."""
+        """True if the press is void, damage is proven, or the last limit is reached with no doubt but `NEAR_LIMIT`."""
         if self.void or self.proves:
             return True
         return self.reached and self._reasons <= {Reason.NEAR_LIMIT}
@@ -247,7 +247,7 @@ class _Case:
 
     @property
     def _doubts(self) -> set[Flag]:
-        """What keeps a needed step from being trusted."""
+        """Flags that keep needed steps from being trusted, those of excused steps left out."""
         needed = [point for point in self.evidence.needed if point not in self.evidence.excused]
         return {flag for point in needed for flag in self.evidence.doubts(point)}
 
@@ -262,7 +262,7 @@ class _Case:
         return None if finding is None else Stop(finding.message, finding)
 
     def _decided(self) -> Definition | None:
-        """Why no further step can change the outcome; None where one can."""
+        """Return the reason why no further step can change the outcome; None where one can."""
         if self.void:
             return messages.STOPPED_VOID
         if self.proves:
@@ -421,7 +421,7 @@ def _least_sure(points: Sequence[Measured]) -> Measured:
 
 
 def _onset(evidence: Evidence, recipe: Recipe) -> Iterator[Finding]:
-    """Whether the curve begins at the onset: one that was seen too soon makes every area seem smaller than it is."""
+    """Yield a finding if the curve does not begin at the onset: one seen too soon makes every area seem too small."""
     begins_mm = evidence.begins_at_mm
     allowed_mm = _LATE_START * recipe.damage.area[0].closing_mm
     if evidence.needed and (begins_mm is None or begins_mm > allowed_mm):
@@ -433,7 +433,7 @@ def _onset(evidence: Evidence, recipe: Recipe) -> Iterator[Finding]:
 
 
 def _reach(case: _Case, stopped: Stop | None) -> Iterator[Finding]:
-    """Whether every damage threshold was reached, and whether the steps ended as they should."""
+    """Yield a finding if a damage threshold was not reached, or if the steps did not end as they should."""
     evidence, recipe = case.evidence, case.limits.recipe
     missing = [limit for limit in recipe.damage.area if evidence.area_at(limit.closing_mm) is None]
     reached_mm = evidence.reached_mm
@@ -449,7 +449,7 @@ def _reach(case: _Case, stopped: Stop | None) -> Iterator[Finding]:
 
 
 def _almost(evidence: Evidence, recipe: Recipe) -> bool:
-    """Whether the last result's closing was reached but for less than a step: a gripper has counts."""
+    """Return whether the last result's closing was reached, or missed by less than a step: a gripper has counts."""
     return evidence.reached_mm > recipe.steps.result_closings_mm[-1] - recipe.steps.step_mm
 
 

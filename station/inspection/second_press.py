@@ -23,7 +23,7 @@ _PER_SPREAD = 10.0
 
 
 def needs_second_press(verdict: Judgement) -> bool:
-    """Whether another press may decide what is still undecided; a fault, or a size that cannot be, it cannot decide."""
+    """Return whether another press may decide an inconclusive fruit; it cannot decide a fault or an impossible size."""
     return verdict.outcome == "NO_RESULT" and set(verdict.reasons) <= PRESS_AGAIN_AT | {Reason.EARLY_STOP}
 
 

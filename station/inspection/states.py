@@ -72,7 +72,7 @@ class StateFacts(NamedTuple):
 
     @property
     def activity(self) -> Message:
-        """What is going on."""
+        """Description of what is going on in the state."""
         return self.text()
 
     @property

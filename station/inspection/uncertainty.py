@@ -59,7 +59,7 @@ class Budget:
         return self.factor * self.combined
 
     def expanded_of(self, *names: str) -> float:
-        """What some of `COMPONENTS` alone would give, as a share of the area."""
+        """Return the expanded uncertainty that some of `COMPONENTS` alone would give, as a share of the area."""
         return self.factor * hypot(*(each.relative for each in self.components if each.name in names))
 
 

@@ -6,7 +6,7 @@ from station.messages.message import Definition, define
 
 
 class AlarmTexts(NamedTuple):
-    """What an operator reads of an alarm."""
+    """Texts of an alarm for the operator."""
 
     cause: Definition
     consequence: Definition

@@ -14,7 +14,7 @@ from station.settings.recipe_model import Recipe
 
 
 class Met(NamedTuple):
-    """Where closing without a stop has met something."""
+    """Widths at the first frame with a contact, and the last without one, of closing without a stop."""
 
     width_mm: float
     """At the first frame with a contact."""
@@ -158,7 +158,7 @@ async def _read(rig: MovingRig) -> _Read:
 
 
 async def _all_go_on(passed: "asyncio.Queue[Step | None]", goes_on: GoesOn) -> bool:
-    """Whether the fingers may close further in every frame up to None."""
+    """Return whether the fingers may close further by every frame of the queue, up to None."""
     while (step := await passed.get()) is not None:
         if not await goes_on(step):
             return False

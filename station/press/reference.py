@@ -34,7 +34,7 @@ class JawsNotOpenError(GripError):
 
 
 def are_open(width_mm: float, widest_mm: float) -> bool:
-    """Whether a measured width is that of the open jaws, or of jaws that were to open to `widest_mm`."""
+    """Return whether a measured width is that of the open jaws, or of jaws that were to open to `widest_mm`."""
     return width_mm >= widest_mm - _OPEN_WITHIN_MM
 
 

@@ -37,7 +37,7 @@ class UnseenContactError(GripError):
 
 
 def touches(seen: MeasuredStep) -> bool:
-    """Whether the approach ends here. A weak contact may be a place of the gel that was another in the reference."""
+    """Return whether the approach ends: at a firm contact, since a weak one may be a mere change of the gel."""
     return seen.contact.is_firm
 
 
@@ -57,22 +57,22 @@ def nothing_touched(recipe: Recipe, at: Position | None = None) -> GripError:
 
 
 def most_unseen_s(recipe: Recipe) -> float:
-    """How long the fingers may move since the capture of the frame that was measured last."""
+    """Return the longest time for the fingers to move since the capture of the frame that was measured last, s."""
     return MOST_UNSEEN_MM / recipe.gripper.speed_mm_s
 
 
 def steps_to_decide(recipe: Recipe) -> int:
-    """How many steps from the first image reach the last damage threshold that a fruit has to keep."""
+    """Count the steps from the first image to the last damage threshold that a fruit has to keep."""
     return min(recipe.steps.number, ceil((recipe.damage.passing_closing_mm - AT_MM) / recipe.steps.step_mm))
 
 
 def ends_steps(press: Press, recipe: Recipe) -> bool:
-    """Whether what was measured so far lets no further step be made, by the judge's rule, which has the reason."""
+    """Return whether the judge's rule ends the steps, by what was measured so far; the rule has the reason."""
     return early_stop(press, recipe) is not None
 
 
 def is_last_step(recipe: Recipe, closed_steps: int, next_width_mm: float, reached: Position) -> bool:
-    """Whether the captured step is the last that can be made, whatever it shows.
+    """Return whether the captured step is the last that can be made, whatever it shows.
 
     Args:
         closed_steps: steps of the recipe by which the fingers have closed since the first image.
@@ -83,7 +83,7 @@ def is_last_step(recipe: Recipe, closed_steps: int, next_width_mm: float, reache
 
 
 def may_decide(recipe: Recipe, closing_mm: float | None) -> bool:
-    """Whether the outcome may be decided by a captured step, so that its measurement comes before the next step.
+    """Return whether a captured step may decide the outcome, so that its measurement comes before the next step.
 
     Args:
         closing_mm: of that step; None before the onset is known.

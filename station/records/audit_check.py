@@ -20,7 +20,7 @@ _HEAD_S, _AGAIN_S = 2.0, 0.02
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """What a person who checks records knows from elsewhere."""
+    """Facts from outside the records to check them by: rows that must exist, public keys, the first row to check."""
 
     anchors: tuple[Head, ...] = ()
     """Rows that the trail must have, as from a backup or a printed report."""

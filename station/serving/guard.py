@@ -83,7 +83,7 @@ class GuardedConnection(socket.socket):
 
     @property
     def _has_spoken(self) -> bool:
-        """Whether any byte has come, read or not."""
+        """True if any byte has come, read or not; False once the connection is closed."""
         try:
             info = self.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO_BYTES_RECEIVED.stop)
         except OSError:
@@ -92,7 +92,7 @@ class GuardedConnection(socket.socket):
 
     @property
     def overdue(self) -> bool:
-        """Whether the next request should be there by now."""
+        """True if the next request should have come by now."""
         limit_s = NEXT_REQUEST_S if self.has_requested else FIRST_REQUEST_S
         return not self.in_request and time.monotonic() - self.since_s > limit_s
 

@@ -32,7 +32,7 @@ _FULL_IMPRINT_PRESSURE = 0.4
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where and how the fruit meets the gel."""
+    """Place and orientation of the fruit on the gel."""
 
     x_px: float = MIDDLE_X_PX
     y_px: float = MIDDLE_Y_PX

@@ -36,7 +36,7 @@ class SoftPatch:
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """What damage does to a fruit under the gel."""
+    """Effect of damage on a fruit under the gel: softer flesh, a flatter surface, a soft patch."""
 
     softening: float = 1.0
     """Share of the flesh's modulus that is left; 1 for sound flesh."""

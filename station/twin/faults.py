@@ -67,7 +67,7 @@ class FaultBoard:
             raise ValueError(f"{self.device} has no fault {fault!r}; it knows: {', '.join(self.known)}")
 
     def active(self, fault: str) -> bool:
-        """Whether a fault is switched on."""
+        """Return whether a fault is switched on."""
         return fault in self._active
 
     def amount(self, fault: str) -> float:
@@ -75,7 +75,7 @@ class FaultBoard:
         return self._active.get(fault, 0.0)
 
     def gone(self, now_s: float, *own: str) -> bool:
-        """Whether the device cannot be reached: off, by a fault of its own, or as `intermittent` comes and goes."""
+        """Return whether the device is unreachable: off, by a fault of its own, or as `intermittent` comes and goes."""
         if any(map(self.active, (CommonFault.OFF, *own))):
             return True
         period_s = self.amount(CommonFault.INTERMITTENT)

@@ -12,7 +12,7 @@ from station.twin.texture import Texture, achenes, calyx, drupelets, smooth
 
 
 class Kind(StrEnum):
-    """What may lie between the fingers."""
+    """Kind of fruit, or of ball, between the fingers."""
 
     STRAWBERRY = "strawberry"
     RASPBERRY = "raspberry"
@@ -23,7 +23,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Variety:
-    """How the fruit of a kind are distributed, and what they are made of."""
+    """Distribution of the fruit of a kind, and the properties of their flesh, shape and skin."""
 
     mean: tuple[float, float, float]
     """Weight g, length mm, width mm."""
@@ -92,7 +92,7 @@ class Fruit:
 
     @property
     def variety(self) -> Variety:
-        """What all fruit of the kind share."""
+        """Properties that all fruit of the kind share."""
         return VARIETIES[self.kind]
 
     @property
@@ -131,7 +131,7 @@ class Fruit:
         return self.damage if self.bruised else NO_DAMAGE
 
     def gap_mm(self, x_mm: FloatArray, y_mm: FloatArray) -> FloatArray:
-        """How far the smoothed surface is behind the foremost point.
+        """Return the distance of the smoothed surface behind the foremost point, mm.
 
         Args:
             x_mm: across the fruit from the foremost point, any shape.
@@ -146,7 +146,7 @@ class Fruit:
         return self.surface.gap_mm(relative_squared.astype(np.float32))
 
     def texture_mm(self, x_mm: FloatArray, y_mm: FloatArray) -> FloatArray:
-        """How far the skin lies below its highest points, at places as for `gap_mm`: pits, seeds, drupelets, calyx."""
+        """Return the skin's depth below its highest points, mm: pits, seeds, drupelets, calyx. Args as for `gap_mm`."""
         return self.variety.texture(x_mm, y_mm, np.random.default_rng([self.seed, 1]))
 
 

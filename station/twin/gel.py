@@ -43,9 +43,9 @@ class Gel:
     """How large the sensor's lens shows it; units differ."""
 
     def stiffening(self, approach_mm: npt.ArrayLike, radius_mm: float) -> npt.NDArray[np.float64]:
-        """How many times stiffer than a half-space the layer is at an approach.
+        """Return the layer's stiffness at an approach as a multiple of a half-space's.
 
-        Held where the contact's radius is 1.5 times the thickness: the polynomial reaches no further, and a pad
+        Constant from where the contact's radius is 1.5 times the thickness: the polynomial ends there, and a pad
         hardly wider than the contact bulges at its sides instead.
 
         Args:
@@ -56,7 +56,7 @@ class Gel:
         return np.asarray(np.polyval(_STIFFENING, np.minimum(slenderness, _SLENDEREST)), np.float64)
 
     def outer_share(self, distance_mm: FloatArray) -> FloatArray:
-        """What the glued underside leaves of a half-space's dent at distances, any shape, outwards from the edge."""
+        """Return the share of a half-space's dent that the glued layer has at distances, any shape, beyond the edge."""
         return np.exp(-np.square(distance_mm / np.float32(self.outer_reach_mm)))
 
 
@@ -91,7 +91,7 @@ class Surface:
     radius_mm: float
 
     def gap_mm(self, relative_squared: FloatArray) -> FloatArray:
-        """How far an ellipsoid is behind its foremost point.
+        """Return the distance of an ellipsoid's surface behind its foremost point, mm.
 
         Args:
             relative_squared: (x/a)² + (y/b)² with the half axes across, any shape; beyond the ellipsoid's

@@ -58,7 +58,7 @@ class _Server(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class TwinOptions:
-    """What the twin is, and where it listens: where the station's settings have the devices."""
+    """Options of the twin, and its addresses: those where the station's settings have the devices."""
 
     fruit: Kind = Kind.STRAWBERRY
     seed: int = 1
@@ -186,7 +186,7 @@ class Twin:
 
 
 def _beside_nest(arm: UrController, poses: ArmPoses) -> Callable[[], tuple[float, float] | None]:
-    """How far the sensor is from its place at the nest, as its image has it; None where it is elsewhere."""
+    """Return a function for the sensor's way from its place at the nest, mm in its image; None if it is elsewhere."""
     to_nest = inverse_transform(forward(poses.nest))
 
     @lru_cache(maxsize=1)  # asked many times a cycle, and mostly the arm stands

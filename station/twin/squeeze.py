@@ -21,7 +21,7 @@ _SAMPLES = 600
 
 @dataclass(frozen=True, slots=True)
 class Squeezed:
-    """What one closing does."""
+    """State of a squeezed fruit at one closing: the force, and the approach with the gel's part of it."""
 
     closing_mm: float
     force_n: float
@@ -32,7 +32,7 @@ class Squeezed:
 
     @property
     def gel_share(self) -> float:
-        """That part as a fraction, 0 to 1."""
+        """The gel's part of the approach as a fraction, 0 to 1."""
         return self.dent_mm / self.approach_mm if self.approach_mm > 0 else 0.0
 
 
@@ -61,7 +61,7 @@ class Squeeze:
         self._closing = approach + back + sponge
 
     def at(self, closing_mm: float) -> Squeezed:
-        """What a closing, mm since first contact, does; zero before the onset, no more than the fruit's crushed end."""
+        """Return the state at a closing, mm since first contact; zero before it, at most that of the crushed fruit."""
         closing = max(0.0, closing_mm)
         approach = float(np.interp(closing, self._closing, self._approach))
         return Squeezed(

@@ -83,11 +83,11 @@ class World:
         return self._squeezed_at(opening_mm).force_n
 
     def squeezed(self) -> Squeezed:
-        """What the gripper's opening does to the fruit now."""
+        """Return the state of the fruit at the gripper's present opening."""
         return self._squeezed_at(self.opening_mm())
 
     def touch(self) -> Touch | None:
-        """What the sensor feels now, to be drawn; None where nothing touches."""
+        """Return the contact on the sensor now, to be drawn; None where nothing touches."""
         squeezed = self.squeezed()
         if self._fruit is None or squeezed.closing_mm <= 0:
             return None

@@ -30,7 +30,7 @@ _NECKS, _NECK_DEPTH = (0.4, 0.55, 0.7, 0.8), 0.12
 
 
 class Candidates(NamedTuple):
-    """Where contacts may lie, and what says so."""
+    """Regions of possible contacts, and the image that shows them."""
 
     regions: list[Mask]
     """Of the curvature's shape, 0 or 1; the most likely first."""
@@ -39,7 +39,7 @@ class Candidates(NamedTuple):
 
 
 def body_candidates(moved: Movement, threshold: float, constants: Constants) -> Candidates:
-    """Where one body may lie: what has moved clear of the noise, or curves enough to reach the threshold.
+    """Find where one body may be: what has moved clear of the noise, or curves enough to reach the threshold.
 
     A place has moved from half of what the curved places mostly reach on; of a faint body wherever it stands out.
 
@@ -65,7 +65,7 @@ def body_candidates(moved: Movement, threshold: float, constants: Constants) -> 
 
 
 def around(place: tuple[int, int], moved: Movement, constants: Constants) -> Candidates:
-    """Where a contact too weak to curve the gel clear of the noise may lie: a small disc, and what has moved with it.
+    """Return the candidate for a contact too weak to curve the gel clearly: a small disc, and what has moved with it.
 
     The place is x and y, px of the movement.
     """
@@ -84,7 +84,7 @@ def disc(shape: tuple[int, ...], place: tuple[int, int], radius_px: int) -> Mask
 
 
 def separate_candidates(curvature: FloatImage, threshold: float) -> Candidates:
-    """Where several contacts may lie, each for itself.
+    """Find where several contacts may be, a region for each.
 
     Of each region counts what curves at least about a third as much as its own strongest place, so that a strong
     neighbour does not hide a weak contact; what narrow necks join is parted.

@@ -17,7 +17,7 @@ _PER_E_FOLD = 4.0
 
 
 def changed(moved: Movement, noise_levels: float, constants: Constants) -> Mask:
-    """Where the image has changed by some times the change's standard deviation where nothing touches.
+    """Return the mask of changed pixels: changed by some times the standard deviation where nothing touches.
 
     Returns:
         Shape (height, width) at half the working size, 0 or 1.
@@ -27,7 +27,7 @@ def changed(moved: Movement, noise_levels: float, constants: Constants) -> Mask:
 
 
 def area_agreement(contact_px: float, changed_px: float, constants: Constants) -> float:
-    """How far a contact's area agrees with the changed area, in one unit, in size, 0 to 1.
+    """Return the agreement of a contact's area and the changed area, in one unit, in size, 0 to 1.
 
     A contact whose contour takes in only a small part of what has changed is a part of a larger one, or another thing;
     one that hardly holds any change has been drawn around nothing. Between the two says little: a halo changes, and a
@@ -38,6 +38,6 @@ def area_agreement(contact_px: float, changed_px: float, constants: Constants) -
 
 
 def growth_agreement(contact_px: tuple[float, float], changed_px: tuple[float, float]) -> float:
-    """How far contour and changed area, each at the last step and now, agree on a contact's shrinking, 0 to 1."""
+    """Return the agreement of contour and changed area, at the last step and now, on a contact's shrinking, 0 to 1."""
     grown, witnessed = (float(np.log(max(now, 1.0) / max(then, 1.0))) for then, now in (contact_px, changed_px))
     return float(np.exp(-_PER_E_FOLD * max(0.0, min(0.0, witnessed) - grown)))

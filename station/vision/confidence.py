@@ -43,7 +43,7 @@ def edge_confidence(edge: Edge, noise_levels: float, constants: Constants) -> fl
 
 
 def agreement(areas: Sequence[float]) -> float:
-    """How far areas, any unit, of one step's frames agree, 0 to 1: one over one plus ten times their relative spread.
+    """Return the agreement of the areas, any unit, of one step's frames, 0 to 1: 1 / (1 + 10 * relative spread).
 
     Multiply an area's confidence by it. One frame agrees with itself.
 

@@ -47,14 +47,14 @@ class Contact:
 
     @property
     def found(self) -> bool:
-        """Whether anything touches the gel."""
+        """True if anything touches the gel."""
         return self.area_px > 0
 
     @property
     def is_firm(self) -> bool:
-        """Whether it is more than a weak contact: closing is counted from such contacts.
+        """True if a contact was found that is more than weak: closing is counted from such contacts.
 
-        A light touch may be a place of the gel that was another in the reference.
+        A weak contact may be a place where the gel has changed since the reference.
         """
         return self.found and not self.is_light
 

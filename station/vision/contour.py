@@ -184,7 +184,7 @@ def _mirrored(region: Mask, constants: Constants) -> tuple[int, int, int, int]:
 
 
 def _reach(region: Mask, rays: Rays) -> _Floats:
-    """How far a region reaches on each ray."""
+    """Return the reach of a region on each ray, in the rays' unit."""
     steps = np.arange(1.0, np.hypot(*region.shape), _REACH_STEP_PX)
     x, y = rays.places(steps)
     values = cv2.remap(region, x, y, cv2.INTER_NEAREST, None, cv2.BORDER_CONSTANT)
@@ -192,7 +192,7 @@ def _reach(region: Mask, rays: Rays) -> _Floats:
 
 
 def inside_image(points: _Floats, shape: tuple[int, int]) -> npt.NDArray[np.bool_]:
-    """Which points, shape (n, 2), x and y in px, lie in an image of this height and width."""
+    """Mark the points, shape (n, 2), x and y in px, that are in an image of this height and width."""
     return (points >= 0).all(axis=1) & (points[:, 0] <= shape[1] - 1) & (points[:, 1] <= shape[0] - 1)
 
 

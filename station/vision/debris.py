@@ -52,7 +52,7 @@ class Debris:
         self._pattern = resized(_pattern(light, wide), self._half) if seen.any() else None
 
     def may_be(self, gate: float, area_px: int) -> bool:
-        """Whether a contact is too steep for its size to be any but debris that has moved, on a gel that has debris.
+        """Return whether, on a gel with debris, a contact is too steep for its size to be any but moved debris.
 
         Args:
             gate: the strongest curvature over the detection threshold.
@@ -84,7 +84,7 @@ class Debris:
 
 
 def _pattern(light: FloatImage, places: npt.NDArray[np.bool_]) -> FloatImage:
-    """What the debris adds to the reference: it less what its surroundings go on as."""
+    """Return what the debris adds to the reference: the reference less its continued surroundings, else zero."""
     wide = cv2.dilate(places.astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_HALO_PX, _HALO_PX)))
     without = cv2.inpaint(light.astype(np.uint8), wide, _INPAINT_PX, cv2.INPAINT_NS).astype(np.float32)
     smooth = cv2.GaussianBlur(without, (0, 0), _INPAINTED_BLUR_PX)

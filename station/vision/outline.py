@@ -80,7 +80,7 @@ def find_outline(
 
 
 def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)) -> Mask:
-    """What an edge, px of half the working size, encloses: a mask, 0 or 255, of a shape, scaled along x and y.
+    """Return what an edge, px of half the working size, encloses: a mask, 0 or 255, of a shape, scaled along x and y.
 
     Pixels whose middle is enclosed. OpenCV's `fillPoly` adds those that the line touches: 1 % of a contact of 12 mm².
     """

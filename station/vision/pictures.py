@@ -73,6 +73,6 @@ def _signed(change: FloatImage, amplification: float) -> Image:
 
 
 def _strength(field: FloatImage, threshold: float) -> Image:
-    """What reaches the threshold is bright; twice the threshold, or the strongest place beyond it, is brightest."""
+    """Colour a field: bright from the threshold on, brightest at twice that, or at the strongest place beyond it."""
     grey = np.clip(field * (255 / max(float(field.max()), 2 * threshold)), 0, 255).astype(np.uint8)
     return np.asarray(cv2.applyColorMap(grey, cv2.COLORMAP_VIRIDIS), np.uint8)

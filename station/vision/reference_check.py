@@ -105,7 +105,7 @@ class ReferenceCheck:
         return 1.0 - found / expected
 
     def _likeness(self, cells: FloatImage) -> float:
-        """How far what the reference's pattern does not explain resembles the pattern of another unit.
+        """Return the likeness (log) of what the reference's pattern leaves unexplained to another unit's pattern.
 
         Args:
             cells: of the frame, shape (rows, columns, 3), grey levels.
@@ -142,7 +142,7 @@ def _patterns(cells: FloatImage) -> list[FloatImage]:
 
 
 def _pattern(cells: FloatImage, band_cells: tuple[float, float]) -> FloatImage:
-    """What is between noise and drift in size, less each column's mean: streaks along the columns drift."""
+    """Return what is between noise and drift in size, less each column's mean: streaks along the columns drift."""
     fine, wide = (cv2.GaussianBlur(cells, (0, 0), sigma) for sigma in band_cells)
     band = fine - wide
     return np.asarray(band - cv2.reduce(band, 0, cv2.REDUCE_AVG), np.float32)

@@ -44,7 +44,7 @@ _Floats = npt.NDArray[np.float64]
 
 
 class Movement(NamedTuple):
-    """What of a frame's change the search for regions needs, at half the working size."""
+    """Change of a frame, prepared for the search for regions, at half the working size."""
 
     change: FloatImage
     """Slightly smoothed, shape (height, width, 3), grey levels."""
@@ -91,7 +91,7 @@ def movement(half: FloatImage, background: Background, flat_field: FloatImage, c
 
 
 def flat_field_correction(light: FloatImage, constants: Constants) -> FloatImage:
-    """What a change is multiplied by to be as large as in the mean light: a slope changes weak light by less.
+    """Return the factor that makes a change as large as in the mean light: a slope changes weak light by less.
 
     Args:
         light: the reference at half the working size, shape (height, width, 3), grey levels.
@@ -182,7 +182,7 @@ def find_region(
 
 
 def _halved(moved: Movement) -> Movement:
-    """What of a movement wide windows need, at half its size."""
+    """Return the part of a movement that wide windows need, at half its size."""
     size = (moved.change.shape[1] // 2, moved.change.shape[0] // 2)
     change, squared, weight = (resized(one, size) for one in (moved.change, moved.squared, moved.weight))
     return moved._replace(change=change, squared=squared, weight=weight)
@@ -204,7 +204,7 @@ def _curved(moved: Movement, region: Mask, rays: Rays, radii: _Floats, constants
 
 
 def _is_skin(moved: Movement, halved: Movement, region: Mask, agreed: float, constants: Constants) -> bool:
-    """Whether the change turns from place to place; the larger the body, the more places there are to disagree."""
+    """Return whether a region is skin: the change turns from place to place, more than its size alone explains."""
     p, radius = constants, radius_of(region)
     if agreed >= _SURELY_SMOOTH:
         return False
@@ -213,7 +213,7 @@ def _is_skin(moved: Movement, halved: Movement, region: Mask, agreed: float, con
 
 
 def _is_skin_by_curvature(moved: Movement, halved: Movement, region: Mask, constants: Constants) -> bool:
-    """Whether a region is skin where there is hardly any background, so that directions say little.
+    """Return whether a region is skin, where there is hardly any background and directions are unreliable.
 
     Skin is what is finer than the body's own slopes, times how much the strongest tenth curves.
     """
@@ -222,7 +222,7 @@ def _is_skin_by_curvature(moved: Movement, halved: Movement, region: Mask, const
 
 
 def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float:
-    """How much of a region's squared change is as fine as achenes are: the medians' ratio, or 0 in few pixels."""
+    """Return the share of a region's squared change that is as fine as achenes: medians' ratio, 0 in too few pixels."""
     size = (change.shape[1], change.shape[0])
     sigmas = (constants.level_window / 2, constants.coarse_blur / 2)
     elements, slopes = (np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32) for sigma in sigmas)
@@ -234,13 +234,13 @@ def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float
 
 
 def has_moved_widely(moved: Movement, constants: Constants) -> bool:
-    """Whether much of the frame has moved far beyond what drift and compression leave over."""
+    """Return whether much of the frame has moved far beyond what drift and compression leave over."""
     levels = level_of(moved, constants.level_window).levels
     return quantile(thinned(levels), 1 - constants.wide_share) > constants.wide_levels
 
 
 class Level(NamedTuple):
-    """How far each place has moved."""
+    """Strength of the change at each place, above the background's."""
 
     levels: FloatImage
     """The change's root mean square over a window above the background's, shape (height, width), grey levels."""

@@ -68,7 +68,7 @@ STAGES = (
 
 
 class Trace(NamedTuple):
-    """What one step of a press hands on to the next."""
+    """Data that one step of a press hands on to the next."""
 
     coefficients: Coefficients | None
     """Of the background model; None where the step itself shows nothing."""
@@ -488,9 +488,9 @@ class RobustMethod:
         return outline if supported else None
 
     def _one_colour(self, state: State, outline: Outline, *, sure: bool) -> bool:
-        """Whether the change inside is of one colour: a contact's slopes point all ways and cancel, dirt's do not.
+        """Return whether the change inside has one colour: a contact's slopes point all ways and cancel, dirt's do not.
 
-        Not of a sure contact that the border cuts: its other slopes may lie outside.
+        False for a sure contact that the border cuts: its other slopes may be outside.
         """
         if "one colour" in self._without or (sure and not outline.edge.seen.all()):
             return False
@@ -507,7 +507,7 @@ class RobustMethod:
         return outline.confidence * float(np.clip((state.gate - 1) / (self._constants.sure_gate - 1), 0, 1))
 
     def _agreement(self, state: State, contact_px: int) -> float:
-        """How far the changed area agrees with the contact area, 0 to 1."""
+        """Return the agreement of the changed area with the contact area, 0 to 1."""
         contact_px = round(contact_px * state.changed.size / (self._shape[0] * self._shape[1]))
         changed_px = cv2.countNonZero(state.changed)
         agreed = area_agreement(contact_px, changed_px, self._constants)
@@ -542,7 +542,7 @@ class RobustMethod:
         return Trace(coefficients, floor, load_levels, contact, state.mask, state.load_levels, changed_px, textured)
 
     def _confirms(self, contact: Mask, before: Mask) -> bool:
-        """Whether a contact holds nearly all of the last step's: chance does not."""
+        """Return whether a contact covers nearly all of the last step's: one by chance does not."""
         area_px = cv2.countNonZero(before)
         return area_px > 0 and cv2.countNonZero(before & contact) >= self._constants.confirmed_share * area_px
 
@@ -567,7 +567,7 @@ class RobustMethod:
 
 
 def _saturated_share(image: Image, mask: Mask) -> float:
-    """How much of an image is saturated within a mask of any size, or everywhere where the mask is empty, 0 to 1."""
+    """Return the saturated share, 0 to 1, of an image within a mask of any size, or of all of it for an empty mask."""
     blue, green, red = cv2.split(image)
     saturated = (cv2.max(cv2.max(blue, green), red) >= SATURATED_LEVEL).view(np.uint8)
     inside = cv2.resize(mask, (image.shape[1], image.shape[0]), interpolation=cv2.INTER_NEAREST)

@@ -18,7 +18,7 @@ region."""
 
 
 def strength(length: FloatImage, region: Mask) -> float:
-    """What the strongest fifth of a change, shape (height, width), reaches in a region, not empty; grey levels."""
+    """Return what a change's strongest fifth, shape (height, width), reaches in a region, not empty; grey levels."""
     few = length[::2, ::2][region[::2, ::2] > 0]
     return quantile(few if few.size else length[region > 0], _STRONG_QUANTILE)
 
@@ -42,7 +42,7 @@ def element_level(length: FloatImage, region: Mask, coherence: float, constants:
 
 
 def union(length: FloatImage, region: Mask, level: float, constants: Constants) -> tuple[Mask, float]:
-    """What is pressed in within a region and close to it, grooves bridged and holes filled, and how sure that is.
+    """Find what is pressed in within a region and close to it, grooves bridged and holes filled, with a confidence.
 
     Args:
         length: of the change, shape (height, width), grey levels.
@@ -51,7 +51,7 @@ def union(length: FloatImage, region: Mask, level: float, constants: Constants) 
         constants: `half_sure`, how fast the confidence falls as the area depends on the level.
 
     Returns:
-        Shape of `length`, 0 or 255; and 0 to 1, the less the more the area depends on the level.
+        The mask, shape of `length`, 0 or 255; and the confidence, 0 to 1, lower if the area depends on the level.
     """
     groove, speck, room = (
         cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)) for side in (_GROOVE_PX, _SPECK_PX, _ROOM_PX)

@@ -93,7 +93,7 @@ class WeakContactDetector:
         self._known = self._drifts_of(reference)
 
     def _drifts_of(self, reference: FloatImage) -> FloatImage:
-        """What the reference turns into as its light gains or its pattern moves, per colour orthonormal.
+        """Return the changes of the reference as its light gains or its pattern moves, per colour orthonormal.
 
         Returns:
             Shape (3, height x width, 5).
@@ -148,7 +148,7 @@ class WeakContactDetector:
         return slice(max(0, y - reach_px), y + reach_px + 1), slice(max(0, x - reach_px), x + reach_px + 1)
 
     def supports(self, region: Mask, response: WeakResponse) -> bool:
-        """Whether a region's slopes exceed noise and drift; True where the reference is not valid enough to say."""
+        """Return whether a region's slopes exceed noise and drift; True where too little of the reference is valid."""
         if np.mean(self._valid[region > 0]) < _LEAST_VALID:
             return True
         with_rim = cv2.dilate(region, np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0

@@ -42,7 +42,7 @@ class Replayed:
 
     @property
     def changes_side(self) -> Literal["", "passes", "rejected"]:
-        """Whether the fruit changes sides: to the accepted ones, or away from them."""
+        """Side that the fruit changes to; empty if it stays on its side or the draft's outcome is unknown."""
         if self.after == "UNDECIDABLE" or (self.before == "PASS") == (self.after == "PASS"):
             return ""
         return "passes" if self.after == "PASS" else "rejected"

@@ -96,7 +96,7 @@ class ArmLink:
 
     @property
     def healthy(self) -> bool:
-        """Whether the lease of the station's health still runs."""
+        """True while the lease of the station's health has not expired."""
         return time.monotonic() < self._healthy_until_s
 
     def renew_health(self, lease_s: float) -> None:
@@ -359,7 +359,7 @@ class ArmLink:
         self._store_or_raise(fault)
 
     async def _plays(self, process: ArmProcess) -> bool:
-        """Whether the program that was just started plays, by a state that is newer than its start."""
+        """Return whether the program just started plays, by a state newer than its start; False if none comes."""
         began_s = time.monotonic()
         while time.monotonic() < began_s + SETTLE_S:
             snapshot = await self._heard(process)

@@ -185,7 +185,7 @@ class UrRtdeProcess:
         return taken
 
     def _late(self) -> bool:
-        """Whether the watchdog may have stopped a program that was playing when last read.
+        """Return whether the watchdog may have stopped a program that was playing when last read.
 
         The limit counts from a kick's begin, which the controller cannot have received before: so whatever it stops,
         however long this process was kept from the processor meanwhile, was late.

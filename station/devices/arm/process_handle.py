@@ -75,7 +75,7 @@ class ArmProcess:
 
     @property
     def ended(self) -> bool:
-        """Whether the process is gone."""
+        """True once the process has ended."""
         return self._process.returncode is not None
 
     async def request(self, request: ArmRequest, reply: type[ReplyT], *, deadline_s: float) -> ReplyT:

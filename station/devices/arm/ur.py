@@ -292,7 +292,7 @@ class UrArm:
         return next((name for name in POSES if _near(joints_rad, poses.joints_rad(name), tolerance)), None)
 
     def _on_nest_way(self, joints_rad: Six) -> bool:
-        """Whether the arm is at the nest, or was stopped on the way between it and the place above it."""
+        """Return whether the arm is at the nest, or was stopped on the way between it and the place above it."""
         place, poses = self._place(joints_rad), self._settings.poses
         if place is not None:
             return place == "nest"
@@ -312,7 +312,7 @@ def _moves(snapshot: Snapshot) -> bool:
 
 
 def _rests(snapshot: Snapshot) -> bool:
-    """Whether the arm is at rest and would move if it were asked to."""
+    """Return whether the arm is at rest and would move if it were commanded to."""
     return snapshot.runtime_state == PLAYING and not _moves(snapshot)
 
 

@@ -203,12 +203,12 @@ class Inspector:
 
     @staticmethod
     def _off_middle(now: Inspection, seen: MeasuredStep) -> Way | None:
-        """How far a measured contact is off the field's middle; None where there is none."""
+        """Return the way from the field's middle to a measured contact, mm; None where there is no contact."""
         centroid_px = seen.contact.centroid_px
         return None if centroid_px is None else off_middle(centroid_px, seen.image.shape, now.mm_per_px)
 
     def _sets_out(self, now: Inspection, off: Way | None) -> bool:
-        """Whether the arm follows a contact; the record says why not."""
+        """Decide whether the arm follows a contact, and set its target; the record gets the reason if it does not."""
         from_mm = now.active.recipe.press.centre_from_mm
         if from_mm is None or off is None:
             return False
@@ -262,7 +262,7 @@ class Inspector:
 
     @staticmethod
     def _closes_on(now: Inspection) -> bool:
-        """Whether the next steps are made without a stop."""
+        """Return whether the next steps are made without a stop."""
         return now.active.recipe.steps.measured == "while_closing" and not now.closed_steps
 
     async def _close_on(self, now: Inspection) -> None:
@@ -286,7 +286,7 @@ class Inspector:
 
     @staticmethod
     def _may_decide(now: Inspection) -> bool:
-        """Whether the last captured step may decide, by a recipe that stops when decided."""
+        """Return whether the last captured step may decide, by a recipe that stops when decided."""
         closing_mm = None if now.onset_mm is None else now.onset_mm - now.steps[-1].move.width_mm
         return stop.may_decide(now.active.recipe, closing_mm)
 

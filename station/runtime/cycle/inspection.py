@@ -77,7 +77,7 @@ class Inspection:
 
     @property
     def is_accepted(self) -> bool:
-        """Whether the fruit passes: by its final outcome, where the PLC has one."""
+        """True if the fruit passes: by the outcome that the PLC was given, or else by the recorded one."""
         final = self.published or self.standing
         return final is not None and final.outcome == "PASS"
 
@@ -93,11 +93,11 @@ class Inspection:
 
     @property
     def steps_to_decide(self) -> int:
-        """How many steps from the first image reach the last damage threshold that the fruit has to keep."""
+        """Number of steps from the first image to the last damage threshold that the fruit has to keep."""
         return steps_to_decide(self.active.recipe)
 
     def whole_steps_to(self, width_mm: float) -> int:
-        """How many whole steps lie between the first image and a width."""
+        """Count the whole steps between the first image and a width."""
         return int((self.steps[0].move.width_mm - width_mm) / self.active.recipe.steps.step_mm)
 
     def _width_after(self, steps: int) -> float:
@@ -105,7 +105,7 @@ class Inspection:
 
     @property
     def presses_made(self) -> int:
-        """How many presses were begun, the present one counted."""
+        """Number of presses begun, the present one counted."""
         return 1 + len(self.earlier)
 
     @property

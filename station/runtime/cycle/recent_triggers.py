@@ -63,7 +63,7 @@ class PendingTrigger:
 
     @property
     def is_answered(self) -> bool:
-        """Whether the request has its answer."""
+        """True once the request has its answer, or the error that has ended it."""
         return self._answer.done()
 
     def answer(self, begun: BeginReply) -> None:

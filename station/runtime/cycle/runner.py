@@ -117,7 +117,7 @@ class CycleRunner:
 
     @property
     def state(self) -> State:
-        """Where the cycle is."""
+        """Present state of the cycle."""
         return self.cycle.state
 
     @property

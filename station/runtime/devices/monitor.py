@@ -134,5 +134,5 @@ def _fault_of(error: Exception) -> StationError:
 
 
 def _kind(fault: StationError | None) -> object:
-    """What the cycle goes by: a stale arm found in a protective stop is news, one that is staler is not."""
+    """Return a fault's type, and an arm fault's cause: the cycle reacts if these change, not if the text alone does."""
     return (type(fault), fault.cause if isinstance(fault, ArmFault) else None)

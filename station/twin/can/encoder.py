@@ -27,7 +27,7 @@ class LineEncoder(TwinNode):
 
     @property
     def count(self) -> int:
-        """Where the belt is, 0 to 2**32 - 1."""
+        """Position of the belt in counts, 0 to 2**32 - 1."""
         return int(self._way) % _RANGE
 
     def tick(self) -> None:

@@ -24,7 +24,7 @@ class TwinNode:
 
     @property
     def operational(self) -> bool:
-        """Whether PDOs are exchanged."""
+        """True while PDOs are exchanged."""
         return self.local.nmt.state == OPERATIONAL
 
     def boot(self) -> None:

@@ -13,7 +13,7 @@ from station.twin.squeeze import Squeeze
 
 @dataclass(frozen=True, slots=True)
 class PressOptions:
-    """How a press is seen."""
+    """Options of a simulated press: the fruit's pose, the sensor and its images, and timing."""
 
     pose: Pose = field(default_factory=Pose)
     unit: int | None = None

@@ -30,7 +30,7 @@ _WORN_LOSS = 0.6
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """What is wrong with the sensor; nothing by default."""
+    """Defects of the sensor and its images; none by default."""
 
     dead_led: Colour | None = None
     torn: bool = False
@@ -184,7 +184,7 @@ def _fitted_levels() -> tuple[float, ...]:
 
 
 def _worn(wear: float) -> FloatArray:
-    """What a worn coating leaves of the light's change, shape (640, 480, 1)."""
+    """Return the share of the light's change that a worn coating leaves, shape (640, 480, 1)."""
     rows, columns = (np.linspace(-1.0, 1.0, side, dtype=np.float32) for side in SENSOR_SHAPE)
     from_middle = np.square(rows)[:, None] + np.square(columns)
     return (1.0 - np.float32(_WORN_LOSS * wear) * np.exp(-from_middle / 2)).astype(np.float32)[..., None]

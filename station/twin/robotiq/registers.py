@@ -13,7 +13,7 @@ REGISTERS = 8
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What the master asks for."""
+    """Command of the master to the gripper, as the robot output registers carry it."""
 
     activate: bool = False
     go_to: bool = False
@@ -45,7 +45,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What the gripper reports."""
+    """Status of the gripper, as the robot input registers report it."""
 
     activate: bool
     go_to: bool

@@ -36,12 +36,12 @@ class Body:
 
     @property
     def moving(self) -> bool:
-        """Whether a motion has not come to its end."""
+        """True while a motion has not come to its end."""
         return self._path is not None
 
     @property
     def steady(self) -> bool:
-        """Whether the arm has stood still for a moment."""
+        """True once the arm has been at rest for `REST_S`."""
         return not self.moving and self._now_s - self._resting_since_s >= REST_S
 
     def advance(self, now_s: float, scaling: float) -> None:
@@ -132,7 +132,7 @@ class Body:
         return nearest(inverse(flange[None])[0], near_rad or self.joints_rad)
 
     def within_range(self, joints_rad: Joints) -> bool:
-        """Whether each joint is a number and within its range either way."""
+        """Return whether each joint is a number and within its range either way."""
         return all(abs(q) <= self._joint_range_rad for q in joints_rad)
 
     def _come_to_rest(self, pace: float, deceleration: float) -> None:

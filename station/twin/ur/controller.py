@@ -122,7 +122,7 @@ class UrController:
 
     @property
     def joints_rad(self) -> Joints:
-        """Where the joints are, rad."""
+        """Positions of the joints, rad."""
         return self.body.joints_rad
 
     @property

@@ -69,7 +69,7 @@ class ToolPath:
 
     @property
     def end_joints(self) -> Joints:
-        """Where the way ends."""
+        """Joint positions at the path's end, rad."""
         return self._joints[-1]
 
     def steepest(self) -> float:

@@ -31,7 +31,7 @@ REQUEST_VERSION, CONTROLLER_VERSION, DATA, OUTPUTS, INPUTS, START, PAUSE = (ord(
 
 
 class OutputRecipe:
-    """What a client subscribed to, packed in one go."""
+    """Output recipe: the variables that a client subscribed to, packed in one go."""
 
     def __init__(self, identity: int, sources: list[tuple[str, Getter]], divider: int) -> None:
         self._getters = [getter for _, getter in sources]
@@ -54,7 +54,7 @@ class OutputRecipe:
 
 
 class InputRecipe:
-    """Which inputs a client's package carries."""
+    """Input recipe: the inputs that a client's package carries."""
 
     def __init__(self, names: list[str], kinds: list[str]) -> None:
         self._fields = [(name, 6 if kind.startswith("VECTOR6") else 1) for name, kind in zip(names, kinds, strict=True)]
@@ -119,7 +119,7 @@ class RtdeConnection(asyncio.Protocol):
 
     @property
     def blocked(self) -> bool:
-        """Whether the client does not read."""
+        """True while the client does not read."""
         return self._blocked_since_s is not None
 
     @property

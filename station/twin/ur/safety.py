@@ -76,12 +76,12 @@ class Safety:
 
     @property
     def powered(self) -> bool:
-        """Whether the joints have power."""
+        """True while the joints have power."""
         return self.robot_mode in {RobotMode.IDLE, RobotMode.RUNNING}
 
     @property
     def may_move(self) -> bool:
-        """Whether a program may play."""
+        """True while a program may play."""
         return self.robot_mode is RobotMode.RUNNING and self.safety_mode is SafetyMode.NORMAL
 
     def advance(self, now_s: float) -> None:
