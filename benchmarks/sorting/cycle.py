@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
-from station.inspection.centring import Way, too_far
+from station.inspection.centring import Offset, too_far
 from station.inspection.fruit_size import FruitSize
 from station.inspection.judge import judge
 from station.inspection.press import Measured, Press
@@ -143,8 +143,8 @@ def move_mm(step: Step, recipe: Recipe, shift_mm: tuple[float, float]) -> tuple[
     if step.offset_px is None or from_mm is None:
         return None
     x_mm, y_mm = (-offset * TYPICAL_MM_PER_PX for offset in step.offset_px)
-    off = Way(x_mm, y_mm)
-    if off.length_mm < from_mm or too_far(off, Way(*shift_mm), ArmSettings().centring.most_mm):
+    off = Offset(x_mm, y_mm)
+    if off.length_mm < from_mm or too_far(off, Offset(*shift_mm), ArmSettings().centring.most_mm):
         return None
     return round(round(x_mm / _ARM_MM) * _ARM_MM, 2), round(round(y_mm / _ARM_MM) * _ARM_MM, 2)
 

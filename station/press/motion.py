@@ -48,7 +48,7 @@ async def sweep(rig: MovingRig, recipe: Recipe, measure: Measure) -> Met:
         NothingTouchedError: nothing was touched down to the recipe's smallest width.
         UnseenContactError: the fingers were stopped by something and the gel shows nothing.
     """
-    unseen_s = stop.most_unseen_s(recipe)
+    unseen_s = stop.longest_unseen_s(recipe)
     readings = [await _read(rig)]
     clear_mm: float | None = None
     newer_than_s = stopped_s = time.monotonic()

@@ -4,7 +4,7 @@
 |---|---|---|
 | approaching | at the first frame with a firm contact | `touches` |
 | approaching | below the smallest expected width, or held by what the gel does not show | `nothing_touched` |
-| moving without a stop | as a measurement is late, until it has come | `most_unseen_s` |
+| moving without a stop | as a measurement is late, until it has come | `longest_unseen_s` |
 | closing without a stop | at the last threshold that a fruit has to keep | `steps_to_decide` |
 | pressing | by what was measured: early stop, largest closing, outcome decided | `ends_steps` |
 | pressing | by what the gripper did: number of steps, force limit, closed fingers | `is_last_step` |
@@ -56,7 +56,7 @@ def nothing_touched(recipe: Recipe, at: Position | None = None) -> GripError:
     )
 
 
-def most_unseen_s(recipe: Recipe) -> float:
+def longest_unseen_s(recipe: Recipe) -> float:
     """Return the longest time for the fingers to move since the capture of the frame that was measured last, s."""
     return MOST_UNSEEN_MM / recipe.gripper.speed_mm_s
 

@@ -79,10 +79,10 @@ class GuardedConnection(socket.socket):
         """A silent one gives way first, then one without a whole request; one with a request under way does not."""
         if self.in_request:
             return None
-        return (2 if self.has_requested else 1 if self._has_spoken else 0, self.since_s)
+        return (2 if self.has_requested else 1 if self._has_sent else 0, self.since_s)
 
     @property
-    def _has_spoken(self) -> bool:
+    def _has_sent(self) -> bool:
         """True if any byte has come, read or not; False once the connection is closed."""
         try:
             info = self.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO_BYTES_RECEIVED.stop)

@@ -68,9 +68,9 @@ class TwinOptions:
     bench: bool = False
     """No arm: the fingers are always where the fruit lies."""
     arm: ArmSettings = field(default_factory=ArmSettings)
-    """Where the station looks for the arm, and the nest's pose."""
+    """Address at which the station connects to the arm, and the nest's pose."""
     can: CanSettings = field(default_factory=CanSettings)
-    """Where the station looks for the reject gate and the encoder; neither is there unless it is enabled."""
+    """Bus of the reject gate and the encoder; neither is there unless it is enabled."""
     gripper: GripperSettings = field(default_factory=GripperSettings)
     camera: TwinCameraSettings = field(default_factory=TwinCameraSettings)
     console_port: int = CONSOLE_PORT
@@ -189,7 +189,7 @@ def _beside_nest(arm: UrController, poses: ArmPoses) -> Callable[[], tuple[float
     """Return a function for the sensor's way from its place at the nest, mm in its image; None if it is elsewhere."""
     to_nest = inverse_transform(forward(poses.nest))
 
-    @lru_cache(maxsize=1)  # asked many times a cycle, and mostly the arm stands
+    @lru_cache(maxsize=1)  # called many times a cycle, and mostly the arm does not move
     def beside(joints_rad: Joints) -> tuple[float, float] | None:
         way_mm = 1000 * (to_nest @ forward(joints_rad))[:3, 3]
         if np.linalg.norm(way_mm) >= _AT_NEST_MM:

@@ -35,13 +35,13 @@ class Contact:
     confidence: float | None = None
     """How far the image supports the area, 0 to 1; None where the method does not say."""
     gate: float | None = None
-    """The gate's statistic over its threshold: contact is looked for from 1 on; None where there is no gate."""
+    """The gate's statistic over its threshold: a contact is searched for from 1 on; None where there is no gate."""
     drift_levels: float | None = None
     """Root mean square of the drift against the reference, grey levels; None where it is not measured."""
     is_light: bool = False
     """Found by its slopes only, as a touch lighter than drift: its area is rough."""
     changed_area_px: int | None = None
-    """The second witness: how much of the image has changed, px; None where the method does not say."""
+    """Part of the image that has changed, px: evidence beside the contour; None where the method does not say."""
     trace: object = field(default=None, repr=False, compare=False)
     """What the method takes over from here to the press's next step; for the method alone."""
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from station.inspection.centring import NOT_MOVED, Way, off_middle, too_far
+from station.inspection.centring import NOT_MOVED, Offset, off_middle, too_far
 
 SHAPE = (640, 480, 3)
 
@@ -13,8 +13,8 @@ def test_right_and_down_in_the_image_are_positive():
 
 
 def test_the_bound_is_counted_from_the_taught_place():
-    assert not too_far(Way(1.8, 2.4), NOT_MOVED, 3.0)
-    assert too_far(Way(1.8, 2.5), NOT_MOVED, 3.0)
-    assert too_far(Way(1.0, 0.0), Way(2.5, 0.0), 3.0)
-    assert not too_far(Way(-1.0, 0.0), Way(2.5, 0.0), 3.0)
-    assert too_far(Way(0.4, 0.0), NOT_MOVED, 0.0)
+    assert not too_far(Offset(1.8, 2.4), NOT_MOVED, 3.0)
+    assert too_far(Offset(1.8, 2.5), NOT_MOVED, 3.0)
+    assert too_far(Offset(1.0, 0.0), Offset(2.5, 0.0), 3.0)
+    assert not too_far(Offset(-1.0, 0.0), Offset(2.5, 0.0), 3.0)
+    assert too_far(Offset(0.4, 0.0), NOT_MOVED, 0.0)

@@ -12,7 +12,7 @@ from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.camera.interface import Frame
 from station.devices.gripper.errors import LINK_ERRORS, GripperTimeoutError
 from station.inspection.alarm_table import AlarmId
-from station.inspection.centring import NOT_MOVED, Way, off_middle, too_far
+from station.inspection.centring import NOT_MOVED, Offset, off_middle, too_far
 from station.inspection.cycle import REASONS, Event
 from station.inspection.judge import judge
 from station.inspection.second_press import FREED_BY_MM, needs_second_press
@@ -166,7 +166,7 @@ class Inspector:
                 stopped = await rig.read()
                 now.measures["overshoot_mm"] = round(met.width_mm - stopped.width_mm, 2)
                 opened, off = await self._backed_off(now, rig, met, stopped)
-                if self._sets_out(now, off):
+                if self._target_contact(now, off):
                     now.closings = 1
                     now.let_go(met.width_mm, opened.width_mm)
                     return Event.OFF_MIDDLE
@@ -179,7 +179,7 @@ class Inspector:
         now.seen.append(first)
         now.closings += 1
         off = self._off_middle(now, now.seen[-1])
-        if plan.start_width_mm is not None and now.closings == 1 and self._sets_out(now, off):
+        if plan.start_width_mm is not None and now.closings == 1 and self._target_contact(now, off):
             now.let_go(first.step.move.width_mm, None)
             return Event.OFF_MIDDLE
         if now.moved != NOT_MOVED and off is not None:
@@ -187,7 +187,7 @@ class Inspector:
         await self._vision.follow(now.seen[-1].contact)
         return Event.ONSET_FOUND
 
-    async def _backed_off(self, now: Inspection, rig: DeviceRig, met: Met, at: Position) -> tuple[Position, Way | None]:
+    async def _backed_off(self, now: Inspection, rig: DeviceRig, met: Met, at: Position) -> tuple[Position, Offset | None]:
         """Open to where nothing touched, and say how far the first contact of the sweep was off the field's middle.
 
         The way is None where there was no contact any more; the fingers came to rest at `at`.
@@ -202,13 +202,13 @@ class Inspector:
             measuring.cancel()
 
     @staticmethod
-    def _off_middle(now: Inspection, seen: MeasuredStep) -> Way | None:
-        """Return the way from the field's middle to a measured contact, mm; None where there is no contact."""
+    def _off_middle(now: Inspection, seen: MeasuredStep) -> Offset | None:
+        """Return a measured contact's offset from the field's middle, mm; None where there is no contact."""
         centroid_px = seen.contact.centroid_px
         return None if centroid_px is None else off_middle(centroid_px, seen.image.shape, now.mm_per_px)
 
-    def _sets_out(self, now: Inspection, off: Way | None) -> bool:
-        """Decide whether the arm follows a contact, and set its target; the record gets the reason if it does not."""
+    def _target_contact(self, now: Inspection, off: Offset | None) -> bool:
+        """Set the arm's target to centre a contact, and return True; record the reason where one that is off is left."""
         from_mm = now.active.recipe.press.centre_from_mm
         if from_mm is None or off is None:
             return False
@@ -331,7 +331,7 @@ class Inspector:
         recipe = now.active.recipe
         now.verdict = judge(now.press(), recipe)
         if now.presses_made < recipe.press.attempts and needs_second_press(now.verdict):
-            self._sets_out(now, self._off_middle(now, now.seen[-1]))
+            self._target_contact(now, self._off_middle(now, now.seen[-1]))
             now.press_again()
             self._metrics.pressed_again(recipe.name)
             return Event.PRESS_AGAIN

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from station.channel.line import Outcome
 from station.clock import utc_ms
-from station.inspection.centring import NOT_MOVED, Way
+from station.inspection.centring import NOT_MOVED, Offset
 from station.inspection.deadlines import Deadlines
 from station.inspection.judge import Judgement
 from station.inspection.press import Measured, Press
@@ -50,9 +50,9 @@ class Inspection:
     """The width beside it at which nothing touched then; None where there was none."""
     closings: int = 0
     """How often the jaws have closed on the fruit."""
-    moved: Way = NOT_MOVED
+    moved: Offset = NOT_MOVED
     """Where the sensor is, from its place at the taught nest."""
-    target: Way | None = None
+    target: Offset | None = None
     """Where it has to go before the next closing; None where it stays."""
     closed_steps: int = 0
     """Steps of the recipe by which the jaws have closed since the first image."""
