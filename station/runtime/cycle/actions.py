@@ -187,7 +187,9 @@ class Inspector:
         await self._vision.follow(now.seen[-1].contact)
         return Event.ONSET_FOUND
 
-    async def _backed_off(self, now: Inspection, rig: DeviceRig, met: Met, at: Position) -> tuple[Position, Offset | None]:
+    async def _backed_off(
+        self, now: Inspection, rig: DeviceRig, met: Met, at: Position
+    ) -> tuple[Position, Offset | None]:
         """Open to where nothing touched, and say how far the first contact of the sweep was off the field's middle.
 
         The way is None where there was no contact any more; the fingers came to rest at `at`.
@@ -208,7 +210,7 @@ class Inspector:
         return None if centroid_px is None else off_middle(centroid_px, seen.image.shape, now.mm_per_px)
 
     def _target_contact(self, now: Inspection, off: Offset | None) -> bool:
-        """Set the arm's target to centre a contact, and return True; record the reason where one that is off is left."""
+        """Set the arm's target to centre a contact, and return True; record why one that is off is left."""
         from_mm = now.active.recipe.press.centre_from_mm
         if from_mm is None or off is None:
             return False
