@@ -55,7 +55,7 @@ async def press(ball: SimulatedRig) -> tuple[list[Image], list[Step]]:
 
 
 def repeats() -> str:
-    """Whether the area rises from 42 to 35 mm, by both methods, on every repeat and another unit's light each time."""
+    """Return a table of how often the area rises from 42 to 35 mm: both methods, another unit's light each time."""
     robust = find_recipe("rubber_ball").segmentation
     methods = {"robust": robust, "paper": robust.model_copy(update={"method": "paper"})}
     rising, ratios = dict.fromkeys(methods, 0), {name: [] for name in methods}
@@ -117,7 +117,7 @@ def scales(recipe: Recipe) -> tuple[str, list[Draft]]:
 
 
 def shifts(recipe: Recipe, draft: Draft, true_mm: float) -> str:
-    """How far a verification of a sound sensor comes from its calibration, so what the tolerances have to bear."""
+    """Return a table of how far a sound sensor's verifications come from its calibration, beside the tolerances."""
     settings, golden, presses = CalibrationSettings(), draft.reference, [step.image for step in draft.steps]
     calibration = draft.calibration
     passed, ratios, contrasts, onsets = 0, [], [], []

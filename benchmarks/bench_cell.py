@@ -58,7 +58,7 @@ def start_twin(configuration: Path) -> subprocess.Popen[str]:
 
 
 class Shares(NamedTuple):
-    """What each process took of a core, and at which rates."""
+    """Shares of a core that each process took, and the rates of frames and of the gripper's steps or reads."""
 
     twin: float
     arm: float

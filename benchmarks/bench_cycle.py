@@ -373,7 +373,7 @@ def table(
 
 
 def pace_table(shipped: Mapping[str, Recipe], results: Mapping[str, Pace], other: Mapping[str, Pace]) -> list[str]:
-    """What a line builder asks first."""
+    """Return the table that a line builder needs first: fruit a minute, times to the outcome and next trigger."""
     rows = []
     for kind in FRUIT:
         outcome_s, next_s = medians(results[kind])
@@ -399,7 +399,7 @@ def pace_table(shipped: Mapping[str, Recipe], results: Mapping[str, Pace], other
 
 
 def phase_table(spent: Spent) -> list[str]:
-    """Where ours goes: each phase of the station's beside the floor's, medians, ms."""
+    """Return a table of the station's own time by phase: its phases less those of the floor, medians, ms."""
     names = ("approach", "onset", "steps", "last measurement", "judging and recording")
     rows = []
     for kind in FRUIT:
@@ -417,7 +417,7 @@ def phase_table(spent: Spent) -> list[str]:
 
 
 def overshoot_table(spent: Spent) -> list[str]:
-    """How far the fingers ran on after the first frame with a contact."""
+    """Return a table of how far the fingers ran on after the first frame with a contact, mm."""
     rows = []
     for kind in FRUIT:
         ways_mm = sorted(each.overshoot_mm for each, *_ in spent[kind])
@@ -461,7 +461,7 @@ def recipes_measured(folder: str, way: Mapping[str, str]) -> Path:
 
 
 def other_way(recipe: Recipe) -> str:
-    """How the recipe is not measured."""
+    """Return the way of measuring, of the two, that the recipe does not use."""
     return "at_rest" if recipe.steps.measured == "while_closing" else "while_closing"
 
 

@@ -34,7 +34,7 @@ _POINTS = 240
 
 
 def over_time(panel: Panel) -> bool:
-    """Whether it shows a time and not a moment."""
+    """Return whether a panel shows values over time, and not at one moment."""
     return panel.data["type"] in {"timeseries", "heatmap"}
 
 

@@ -39,7 +39,7 @@ Step = Callable[[float], Awaitable[object]]
 
 
 def count_for(width_mm: float) -> int:
-    """What a bare client has to know itself: the count of a width beside the DIGIT."""
+    """Return the gripper's count for a width beside the DIGIT, which a bare client has to compute itself."""
     return round(230 - (width_mm + 32.0) * 227 / 85)
 
 

@@ -90,7 +90,7 @@ class Demo(NamedTuple):
         raise SystemExit(f"the demonstration has no process {name}")
 
     def fruit(self) -> int:
-        """How many there were."""
+        """Count the fruit in the demonstration's log."""
         return sum(line[:1].isdigit() for line in self.log.read_text(encoding="utf-8").splitlines())
 
 

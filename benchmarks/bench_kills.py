@@ -122,7 +122,7 @@ async def opened_once(folder: Path) -> None:
 
 
 def verify(folder: Path, told: dict[str, dict[int, int]], repeated: int) -> dict[str, int]:
-    """What is wrong: all 0 where nothing is."""
+    """Count each kind of loss or fault in the records after the kills: all 0 if nothing is wrong."""
     wrong: Counter[str] = Counter({"numbers given twice": repeated})
     found = check_records(folder)
     with closing(sqlite3.connect(folder / FILE_NAME)) as database:

@@ -32,7 +32,7 @@ _LIMIT_S = 900.0
 
 
 def total(server: Server) -> int:
-    """How many inspections have arrived; what they were while the server is away is not known, so 0."""
+    """Count the inspections that have arrived; 0 while the server is away, as their number is unknown then."""
     with contextlib.suppress(Exception), server.connect() as connection:
         found = connection.execute("SELECT count(*) FROM inspections").fetchone()
         return found[0] if found else 0
@@ -87,7 +87,7 @@ async def tell(server: Server, home: Path, rows: int) -> tuple[float, dict[str, 
 
 
 def verify(server: Server, rows: int) -> dict[str, int]:
-    """What is wrong with what arrived: all 0 where nothing is."""
+    """Count each kind of fault in what arrived: all 0 if nothing is wrong."""
     each = rows // STATIONS
     questions = {
         "missing": f"SELECT {each * STATIONS} - count(DISTINCT (station, sequence)) FROM inspections",

@@ -40,7 +40,7 @@ def ratio(task: Task) -> float:
 
 
 def table(tasks: Sequence[Task]) -> list[str]:
-    """What the shorter pause does to the area, by kind."""
+    """Return a table of the area after the shipped pause over that after the longer one, by kind of fruit."""
     names = ("fruit", "pause, s", "fruit pressed", f"area over that after {LONGER_PAUSE_S:g} s: median", "furthest")
     lines = [f"| {' | '.join(names)} |", "|---" * len(names) + "|"]
     for kind in KINDS:

@@ -42,7 +42,7 @@ OURS, PLAIN, STOCK, LIBMODBUS = "this server", "this server, ordinary priority",
 
 
 class Figures(NamedTuple):
-    """What one run of the client program measured."""
+    """Measurements of one run of the client program."""
 
     replies_per_s: float
     p50_us: float
@@ -160,7 +160,7 @@ def throughput_table(idle: dict[tuple[str, int, int], Figures], busy: dict[tuple
 
 
 def verdict(idle: dict[tuple[str, int, int], Figures], busy: dict[tuple[str, int, int], Figures]) -> str:
-    """What was wanted, and what came of it, for one PLC and for 32 clients."""
+    """Return a table of the requirements and the measured values, for one PLC and for 32 clients."""
     alone, loaded = idle[OURS, 1, SCAN_US].p99_us, busy[OURS, 1, SCAN_US].p99_us
     stock = busy[STOCK, 1, SCAN_US].p99_us
     ratio = idle[PLAIN, 32, 0].replies_per_s / idle[STOCK, 32, 0].replies_per_s

@@ -137,7 +137,7 @@ def row(name: str, begins_s: list[float], conclusions_s: list[float], took_s: fl
 
 
 def sync_ms(folder: Path) -> float:
-    """What one fsync of a small append costs on this disk, median."""
+    """Return the median time of one fsync of a small append on this disk, ms."""
     times_s = []
     with (folder / "sync").open("wb", buffering=0) as file:
         for _ in range(200):
@@ -149,7 +149,7 @@ def sync_ms(folder: Path) -> float:
 
 
 def questions(rows: int) -> dict[str, Query]:
-    """What a quality manager asks, from common to never found."""
+    """Return a quality manager's queries by name, from common ones to those that find nothing."""
     lot, _, _ = made(rows // 2)
     grower, other = grower_of(lot), grower_of(made(rows // 2 + 100_000)[0])
     day = 24 * 3_600_000
@@ -198,7 +198,7 @@ def plain_sql(query: Query) -> tuple[str, list[object]]:
 
 
 def pages(folder: Path, rows: int) -> list[list[str]]:
-    """How long the first and some next pages take, for each question."""
+    """Return a row for each query: rows found, times of the first and the slowest page, and of bare sqlite3, ms."""
     table = []
     for name, query in questions(rows).items():
         with reading(folder) as connection:

@@ -50,7 +50,7 @@ NAMES = {"twin": "twin (not of a real station)", "service": "service, with the a
 
 
 class Use(NamedTuple):
-    """What one of the station's processes has taken, with those that it started."""
+    """CPU time and memory that one of the station's processes has taken, with those that it started."""
 
     cpu_s: float
     resident_mb: float

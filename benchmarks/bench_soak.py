@@ -40,7 +40,7 @@ _ARRIVAL_S = 60.0
 
 @dataclass(slots=True)
 class Run:
-    """What a run has found so far: it is written, whatever ends it."""
+    """Results of a run so far; they are written, whatever ends the run."""
 
     samples: list[Sample] = field(default_factory=list)
     """One for each window."""
@@ -48,11 +48,11 @@ class Run:
 
 
 async def latency(load: Path, port: int, ended: asyncio.Event) -> Latency | None:
-    """What a PLC that reads each scan waits for its replies, for one window; None where the soak ends in it.
+    """Measure a server's response times at one read each scan, for one window; None where the soak ends in it.
 
     Args:
         load: the client program.
-        port: of the PLC interface.
+        port: of the PLC interface, or of the bare server.
         ended: set where the soak is to end.
     """
     arguments = (HOST, str(port), "1", str(WINDOW_S), str(SCAN_US))
@@ -141,10 +141,10 @@ def sampled(cell: Cell, latencies: tuple[Latency, Latency], work: float, at_s: f
 
 
 async def unsent(cell: Cell) -> int:
-    """How many of the decided inspections PostgreSQL does not have, with those from before, after some time for them.
+    """Count the decided inspections, with those from before, that PostgreSQL does not have after some time for them.
 
     Args:
-        cell: whose line has ended.
+        cell: the soak, after its line has ended.
     """
     answered = sum(number for how, number in cell.line.summary.decided.items() if how in {"PASS", "FAIL", "NO_RESULT"})
     until_s, missing = time.monotonic() + _ARRIVAL_S, answered

@@ -103,7 +103,7 @@ def failure_table(studies: dict[tuple[Kind, str], Study]) -> str:
 
 
 def cause_table(studies: dict[tuple[Kind, str], Study]) -> str:
-    """Why samples failed."""
+    """Return a table of the causes of failed samples, by fruit and method."""
     rows = []
     for (kind, method), study in studies.items():
         if kind == Kind.RUBBER_BALL:
@@ -236,7 +236,7 @@ def gauge_table(study: GaugeStudy) -> str:
 
 
 def origin_table(study: GaugeStudy) -> str:
-    """Where the variation comes from."""
+    """Return a table of the gauge study's sources of variation, each with all above it, in % of the tolerance."""
     rows = [[one.name, *(f"{percent:.1f}" for percent in tolerance_percents(one.gauge))] for one in study.origins]
     return table(["what varies, each row with all above it", "EV", "AV", "INT", "GRR"], rows)
 

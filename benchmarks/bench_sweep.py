@@ -107,7 +107,7 @@ def press_of(one: Specimen, onset: Onset) -> Press:
 
 
 class Borne(NamedTuple):
-    """What one fruit bore in its first press, by both ways."""
+    """Last closings and true forces of one fruit's first press: by steps, and while closing."""
 
     task: Task
     stepped_mm: float

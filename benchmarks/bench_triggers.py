@@ -54,7 +54,7 @@ Row = tuple[Passage, LaidFruit]
 
 
 class Run(NamedTuple):
-    """What a line decided, and how its fruit waited."""
+    """Decisions of a line, and the waiting times of its fruit."""
 
     rows: list[Row]
     counted: dict[str, float]
@@ -123,7 +123,7 @@ def scrape(url: str) -> str:
 
 
 def disagreements(site: Configuration, rows: list[Row], counted: dict[str, float]) -> list[str]:
-    """Where the PLC, the records and the metrics do not tell the same, in words."""
+    """Return the disagreements between the PLC, the records and the metrics, in words."""
     wrong = []
     folder = records_folder(site.home)
     seen: set[int] = set()
@@ -187,7 +187,7 @@ def errors(rows: list[Row], kinds: Sequence[str] = KINDS) -> str:
 
 
 def reasons(rows: list[Row]) -> str:
-    """Why sound fruit was diverted."""
+    """Return a table of the reasons why sound fruit was diverted."""
     found = Counter(
         (fruit.kind, ", ".join(reason.replace("_", " ") for reason in passage.reasons) or str(passage.decision))
         for passage, fruit in rows

@@ -153,7 +153,7 @@ def paper(reference: Image, presses: list[Press]) -> str:
 
 
 def edges() -> str:
-    """How far the visible edge (steepest fall-off of the change) lies from the edge of the true mask."""
+    """Return a table of how far the visible edge (steepest fall-off of the change) is from the true mask's edge, px."""
     rows: list[list[object]] = []
     for kind in (Kind.TEST_SPHERE, Kind.RUBBER_BALL):
         for closing_mm in CLOSINGS_MM[kind]:

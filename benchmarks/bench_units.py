@@ -65,11 +65,11 @@ def calibrate(unit: SensorUnit) -> tuple[Found, int]:
 
 
 def accuracy(units: Sequence[SensorUnit], found: Sequence[Found], refused: int) -> list[str]:
-    """How far the found scales are from the true ones, beside what the calibrations state.
+    """Return a table of the found scales' errors, beside the uncertainties that the calibrations state.
 
     Args:
-        units: the true ones.
-        found: of each unit.
+        units: with the true scales.
+        found: the calibration of each unit.
         refused: calibrations that had to be repeated.
     """
     errors = [one.mm_per_px / unit.mm_per_px - 1 for unit, one in zip(units, found, strict=True)]

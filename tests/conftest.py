@@ -93,7 +93,7 @@ _remember_tasks()
 
 
 def _awaited(task: asyncio.Task[Any]) -> Iterator[str]:
-    """Where a task waits, from its own line down to the innermost."""
+    """Yield the lines where a task waits, from its own down to the innermost."""
     waiting: Any = task.get_coro()
     while waiting is not None:
         frame = getattr(waiting, "cr_frame", None) or getattr(waiting, "gi_frame", None)
@@ -119,7 +119,7 @@ _tell_tasks_of_a_timeout()
 
 
 def _has_children() -> bool:
-    """Whether there is any child: the kernel says it fifty times sooner than a search of all processes."""
+    """Return whether there may be a child: reading /proc is fifty times quicker than a search of all processes."""
     try:
         said = [path.read_text() for path in Path("/proc/self/task").glob("*/children")]
     except OSError:  # a thread has just ended
@@ -128,7 +128,7 @@ def _has_children() -> bool:
 
 
 class Living(NamedTuple):
-    """What is alive in this process and below it."""
+    """Threads, processes, ports and tasks that are alive in this process and below it."""
 
     threads: frozenset[threading.Thread]
     processes: frozenset[int]
@@ -154,7 +154,7 @@ class Living(NamedTuple):
         )
 
     def beyond(self, before: "Living") -> list[str]:
-        """What is here now and was not before, in words."""
+        """Return what is here now and was not before, in words."""
         new_threads = [thread.name for thread in self.threads - before.threads if thread.is_alive()]
         return [
             *(f"thread {name}" for name in new_threads),

@@ -23,7 +23,7 @@ def test_an_error_that_is_raised_again_and_again_does_not_grow():
 
 
 def is_kept(node: ast.expr | None) -> bool:
-    """Whether a raised expression is, or may be, an attribute's error as it is."""
+    """Return whether a raised expression is, or may be, an attribute's error as it is."""
     match node:
         case ast.Attribute(attr=name):
             return name.islower()  # a class of errors begins with a capital

@@ -49,10 +49,10 @@ def made(number: int) -> tuple[str, str, tuple[str, ...]]:
 
 
 def fruit_of(number: int) -> str:
-    """What was inspected.
+    """Return the kind of fruit of an inspection.
 
     Args:
-        number: its sequence.
+        number: its sequence number.
     """
     return "strawberry" if number // LOT_SIZE % RARE_FRUIT_LOT else "raspberry"
 

@@ -80,7 +80,7 @@ class Row(NamedTuple):
 
     @property
     def wrong(self) -> list[str]:
-        """What does not hold; empty where all does."""
+        """Faults seen during and after the attack, in words; empty if there are none."""
         process = self.process
         grown_mb, left = process.after_mb - process.before_mb, process.after_files - process.before_files
         said = (

@@ -169,7 +169,7 @@ def second_writer(target: Target) -> Found:
 
 
 def replays(target: Target) -> Found:
-    """What the PLC has written is read, and written again, key and trigger included."""
+    """Read what the PLC has written, and write it again, key and trigger included; each such write must be refused."""
     wire = Wire(target.modbus)
     count = BY_NAME["size_class"].address + 1
     with contextlib.closing(wire.socket):

@@ -18,7 +18,7 @@ CONNECT_S = 10.0
 
 
 class Target(NamedTuple):
-    """What an attacker reaches, and where the results are read."""
+    """Attacked station: ports and URLs that an attacker reaches, and the places where the results are read."""
 
     modbus: int
     modbus_tls: int
@@ -39,7 +39,7 @@ class Target(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What an attack came to."""
+    """Result of an attack."""
 
     tries: int
     seen: str

@@ -32,10 +32,10 @@ Floats = npt.NDArray[np.float64]
 
 
 def sums(score: PressScore, scored: str) -> Floats:
-    """What a press adds to its data set's three means, of contacts, of empty frames and of presses.
+    """Return a press's part of its data set's three means, of contacts, of empty frames and of presses.
 
     Args:
-        score: of the press.
+        score: the press's measured steps.
         scored: as in `Group`.
 
     Returns:

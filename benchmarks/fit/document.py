@@ -49,12 +49,12 @@ def write_section(name: str, lines: Sequence[str]) -> None:
 
 
 def machine() -> str:
-    """What the run had for itself."""
+    """Return the number of cores and the load of the machine, in words."""
     return f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
 
 
 def evaluation_table(scores: Scores, groups: Groups) -> list[str]:
-    """What was measured on one part, data set by data set."""
+    """Return a table of the measurements on one part, data set by data set."""
     lines = [
         f"| {' | '.join(COLUMNS)} |",
         "|---" * len(COLUMNS) + "|",

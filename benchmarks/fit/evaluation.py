@@ -60,7 +60,7 @@ class Step(NamedTuple):
 
     @property
     def has_area(self) -> bool:
-        """Whether a contact is found."""
+        """True if a contact was found."""
         return self.area_px > 0
 
 
@@ -166,7 +166,7 @@ def _recorded(constants: Constants) -> tuple[Constants, Callable[[], int]]:
 
 
 def is_judged(contact: Contact, least_confidence: float) -> bool:
-    """Whether the station would make a result of it."""
+    """Return whether the station would make a result of a contact."""
     doubts = {Flag.LOW_CONFIDENCE, Flag.UNDECIDED, Flag.REFERENCE_MISMATCH} & contact.flags
     return contact.found and not doubts and (contact.confidence or 0.0) >= least_confidence
 

@@ -208,7 +208,7 @@ def _measured(least_confidence: float) -> dict[str, list[Area]]:
 
 
 def counted(areas: Sequence[Area]) -> Count:
-    """How many of some areas are judged and wrong."""
+    """Count some areas: all, those judged, those judged and wrong, and the presses with a judged one."""
     judged = [one for one in areas if one.judged]
     wrong = sum(one.error > LARGE_ERROR for one in judged)
     return Count(len(areas), len(judged), wrong, len({one.press for one in judged}))

@@ -58,7 +58,7 @@ class Change(NamedTuple):
 
     @property
     def matters(self) -> bool:
-        """Whether the effect is more than the choice of seeds."""
+        """True if the effect is larger than the choice of seeds explains."""
         return abs(self.effect) > max(LEAST_EFFECT, ERRORS * self.error)
 
 
@@ -75,12 +75,12 @@ class Sensitivity(NamedTuple):
 
     @property
     def matters(self) -> bool:
-        """Whether it matters when changed by a fifth."""
+        """True if the constant matters when changed by a fifth."""
         return any(change.matters for change in self.near)
 
     @property
     def matters_at_all(self) -> bool:
-        """Whether it matters when changed far, or left out, at least."""
+        """True if the constant matters when changed by a fifth, when changed far, or when left out."""
         far = (*(self.wide or ()), *([] if self.out is None else [self.out]))
         return self.matters or any(change.matters for change in far)
 

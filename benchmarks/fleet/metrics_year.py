@@ -37,7 +37,7 @@ class Timed(NamedTuple):
 
 
 def gauges(station: str) -> Iterator[Gauge]:
-    """What the dashboard Fleet asks for of one station: scraped, or as the rules record it."""
+    """Yield the metrics of one station that the dashboard Fleet queries: scraped, or as the rules record them."""
     scraped = {"job": "station", "instance": station, "station": station}
     recorded = {"station": station}
     yield "up", scraped, 1.0, 0.0

@@ -48,7 +48,7 @@ class Cell:
 
     @property
     def metrics(self) -> str:
-        """Where Prometheus scrapes it."""
+        """Address at which Prometheus scrapes the station, host and port."""
         return f"{self.site.metrics.host}:{self.site.metrics.port}"
 
 
@@ -160,10 +160,10 @@ def last_entry(cell: Cell) -> int:
 def disagreements(
     cell: Cell, own: dict[int, str], arrived: Sequence[tuple[int, str]], counted: dict[str, int], wanted: int
 ) -> list[str]:
-    """Where the PLC, the records, PostgreSQL and Prometheus differ, in words.
+    """Return the differences between the PLC, the records, PostgreSQL and Prometheus, in words.
 
     Args:
-        cell: whose.
+        cell: the station with its line.
         own: its records, by `recorded`.
         arrived: number and outcome of each of its rows in PostgreSQL.
         counted: Prometheus' counts by outcome.

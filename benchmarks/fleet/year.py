@@ -170,7 +170,7 @@ def timed(connection: Any, statement: str) -> tuple[list[Any], float]:
 
 
 def equal(some: Sequence[Any], others: Sequence[Any], tolerance: float) -> bool:
-    """Whether two answers have the same rows, in whatever order, their broken numbers to a relative tolerance."""
+    """Return whether two results have the same rows in any order, their floats equal to a relative tolerance."""
 
     def keyed(rows: Sequence[Any]) -> dict[tuple[Any, ...], list[float]]:
         return {

@@ -37,7 +37,7 @@ CORES = os.cpu_count() or 1
 
 
 class Round(NamedTuple):
-    """What one condition gave in one round."""
+    """Measurements of one condition in one round."""
 
     latency: Figures
     shares: dict[str, float]
@@ -152,7 +152,7 @@ class Difference(NamedTuple):
 
     @property
     def beyond_noise(self) -> bool:
-        """Whether the interval leaves 0 out."""
+        """True if the interval does not contain 0."""
         return not self.lowest <= 0 <= self.highest
 
 

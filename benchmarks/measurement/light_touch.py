@@ -61,7 +61,7 @@ class Light(NamedTuple):
 
     @property
     def found(self) -> bool:
-        """Whether it has an area."""
+        """True if an area was found."""
         return self.ratio > 0
 
 
@@ -101,7 +101,7 @@ def light_contacts(frames_per_step: int, references: int) -> tuple[list[Light], 
 
 
 def gate_table(contacts: list[Light], presses: list[Beside]) -> list[str]:
-    """What other gates of the light touches' response would find, and where they would open though nothing touches."""
+    """Return a table of other detection thresholds: lightest contacts found, and detections where nothing touches."""
     lightest = [one.response for one in contacts if one.area_mm2 == LIGHT_AREAS_MM2[0]]
     empty = [one.response for unit in UNITS for one in untouched(unit, "plain")]
     beside: list[float] = []
@@ -125,7 +125,7 @@ def gate_table(contacts: list[Light], presses: list[Beside]) -> list[str]:
 
 
 def more_frames_table(contacts: list[Light]) -> list[str]:
-    """What is found of all four fruits with the recipes' frames, and with more.
+    """Return a table of the contacts found on all four fruits with the recipes' frames, and with more.
 
     Args:
         contacts: those of the recipes' frames.

@@ -43,7 +43,7 @@ Floats = npt.NDArray[np.float64]
 
 
 def conditions() -> dict[str, PressOptions]:
-    """What the twin's presses are seen under."""
+    """Return the conditions of the twin's presses, by name."""
     return {
         "plain": PressOptions(),
         "another unit": PressOptions(unit=7),

@@ -19,7 +19,7 @@ TWIN_SEEDS = range(101_000, 101_100)
 
 
 def reference_table(folder: Path) -> list[str]:
-    """What is flagged, found and judged against a reference that does not belong to the frames."""
+    """Return a table of frames flagged, found and judged against a reference that does not belong to them."""
     rows: list[tuple[str, list[Contact]]] = []
     paths = sorted((folder / "digit_backgrounds").glob("*.jpg"))
     units = [np.asarray(cv2.imread(str(path)), np.uint8) for path in paths]

@@ -22,7 +22,7 @@ AFTER_S = (1.0, 3.0, 5.0, 7.0, 9.0, 11.0)
 
 
 class Untouched(NamedTuple):
-    """What is found on one unit at one of the times."""
+    """Measurement of one untouched unit at one of the times."""
 
     contact: Contact
     response: float
@@ -32,7 +32,7 @@ class Untouched(NamedTuple):
 
 
 def untouched(unit: int, condition: str) -> list[Untouched]:
-    """What is found on one unit at each of the times."""
+    """Measure one untouched unit at each of the times."""
     options, parameters = conditions()[condition], RobustParameters()
     sensor = DigitSensor(unit, unit, options.noise, options.drift)
     frames = [sensor.frame(None, k / FRAMES_PER_S, options.condition) for k in range(options.references)]

@@ -22,7 +22,7 @@ class Panel(NamedTuple):
 
     @property
     def targets(self) -> list[dict[str, Any]]:
-        """What it asks."""
+        """Queries of the panel, as its file has them."""
         return self.data["targets"]
 
 
@@ -98,7 +98,7 @@ def rules() -> Iterator[tuple[str, str]]:
 
 
 def used(names: set[str]) -> set[str]:
-    """Which of these metrics a rule or a dashboard asks for.
+    """Return those of some metrics that a rule or a dashboard queries.
 
     Args:
         names: as they are scraped, with a histogram's `_bucket`, `_sum` or `_count`.

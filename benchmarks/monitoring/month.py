@@ -69,7 +69,7 @@ def troubles(*days: int) -> tuple[Trouble, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What is simulated."""
+    """Plan of the simulation: its days, the time between samples, and the troubles."""
 
     begin_s: int
     """Midnight of the first day, UTC, seconds since 1970."""
@@ -124,7 +124,7 @@ class Line:
         return metrics
 
     def _change(self) -> None:
-        """What a person mends when a trouble ends."""
+        """Calibrate and verify anew when a trouble has just ended, as a person does; a bad lot needs neither."""
         for trouble in self.plan.troubles:
             if trouble.kind != "bad lot" and 0 <= self._now_s - trouble.end_s < self.plan.step_s:
                 self._calibrated_s = self._verified_s = self._now_s

@@ -35,7 +35,7 @@ class UnansweredError(Exception):
 
 
 def missing() -> str | None:
-    """What is not installed of it; None where all is."""
+    """Return the first of `prometheus` and `promtool` that is not installed; None if both are."""
     return next((name for name in ("prometheus", "promtool") if shutil.which(name) is None), None)
 
 
@@ -87,14 +87,14 @@ class Prometheus:
         self.address = address
 
     def now(self, expr: str, at_s: float | None = None) -> list[Series]:
-        """What an expression is at one time.
+        """Evaluate an expression at one time.
 
         Args:
             expr: PromQL.
-            at_s: when; now where left out.
+            at_s: the time, seconds since 1970; None for now.
 
         Raises:
-            UnansweredError: it is wrong.
+            UnansweredError: the expression is wrong.
         """
         found = self._ask("query", query=expr, **({} if at_s is None else {"time": at_s}))
         if found["resultType"] == "scalar":
@@ -102,16 +102,16 @@ class Prometheus:
         return [Series(each["metric"], [_point(each["value"])]) for each in found["result"]]
 
     def over(self, expr: str, begin_s: float, end_s: float, step_s: float) -> list[Series]:
-        """What an expression was over a time.
+        """Evaluate an expression over a range of time.
 
         Args:
             expr: PromQL.
-            begin_s: from when, seconds since 1970.
-            end_s: until when.
+            begin_s: first time, seconds since 1970.
+            end_s: last time.
             step_s: between two points.
 
         Raises:
-            UnansweredError: it is wrong, or too much is asked for.
+            UnansweredError: the expression is wrong, or has too many points.
         """
         found = self._ask("query_range", query=expr, start=begin_s, end=end_s, step=step_s)
         return [Series(each["metric"], [_point(pair) for pair in each["values"]]) for each in found["result"]]

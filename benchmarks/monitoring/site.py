@@ -139,13 +139,13 @@ def _decided(prometheus: Prometheus) -> float:
 
 
 def _scraped_often(prometheus: Prometheus) -> bool:
-    """Whether also the youngest count has been seen to stand still: before that it has no rate."""
+    """Return whether even the newest count was scraped three times, and so seen unchanged: before, it has no rate."""
     found = prometheus.now("min(count_over_time(station_inspections_total[5m]))")
     return bool(found) and found[0].points[0][1] >= 3
 
 
 def _has_a_week(prometheus: Prometheus) -> bool:
-    """Whether the reject rate was known a "week" ago; on a busy machine the last fruit's comes late."""
+    """Return whether the reject rate was known a "week" ago; on a busy machine the last fruit's comes late."""
     found = prometheus.now(f"station_fruit:reject_ratio:1h offset {WEEK}")
     return any(not math.isnan(each.points[0][1]) for each in found)
 

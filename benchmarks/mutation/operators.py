@@ -147,7 +147,7 @@ def _may_be_left_out(holder: ast.AST, field: str, node: ast.AST, count: int, *, 
 
 
 def _replacements(node: ast.AST) -> Iterator[ast.AST]:
-    """What may take a node's place."""
+    """Yield the nodes that may replace a node."""
     yield from _operators(node)
     yield from _conditions(node)
     match node:

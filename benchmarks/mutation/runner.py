@@ -42,7 +42,7 @@ _PASSED, _FAILED, _NO_MODULE = 0, 1, 2
 
 
 class Fate(StrEnum):
-    """What became of a mutant."""
+    """Outcome of a mutant."""
 
     KILLED = "killed"
     ALIVE = "alive"
@@ -223,7 +223,7 @@ def _in_place(todo: Sequence[Changed], tests: Sequence[str], order: Order) -> It
 
 
 def _is_called(changed: Changed, called: set[tuple[str, str]]) -> bool:
-    """Whether the mutant's function, or one around it, was called already; a class's own code always was."""
+    """Return whether the mutant's function, or one around it, was called already; a class's own code always was."""
     return any(
         file == str(changed.path) and f"{changed.mutant.where}.".startswith(f"{name.replace('.<locals>', '')}.")
         for file, name in called

@@ -11,7 +11,7 @@ _SOURCE = Path(__file__).with_name("shifted_clock.c")
 
 
 class CannotDoError(StationError):
-    """What a scenario asks cannot be done on this machine."""
+    """Error: a step of a scenario cannot be carried out on this machine."""
 
 
 class ShiftedClock:

@@ -210,7 +210,7 @@ class _Run:
             await asyncio.sleep(_LOOK_S)
 
     async def _needs_person(self) -> str:
-        """What the station, once it answers again, waits for a person with; empty where it does not."""
+        """Return the cause why the station, once it responds again, waits for a person; empty where it does not."""
         wire, last, since_s = self.wire, "", 0.0
         ends_s = time.monotonic() + _PATIENCE_S
         while time.monotonic() < ends_s:

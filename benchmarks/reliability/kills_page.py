@@ -65,7 +65,7 @@ class Round(_Kept):
 
 
 class Station(_Kept):
-    """What one station's records hold after all its rounds."""
+    """Contents of one station's records after all its rounds."""
 
     seed: int
     inspections: int

@@ -51,7 +51,7 @@ class Observer:
 
     @property
     def needs_person(self) -> bool:
-        """Whether only a person leads the station on."""
+        """True while only a person can make the station go on."""
         held_fruit = self.packml == "held" and AlarmId.FRUIT_HELD in self.alarms
         return held_fruit or self.packml in {"aborted", "stopped"}
 

@@ -43,7 +43,7 @@ class _Stuck(Exception):  # noqa: N818 (no error of the program's)
 
 
 class _Before(NamedTuple):
-    """What there was before a fruit."""
+    """Counts of the line before a fruit."""
 
     passages: int
     losses: int

@@ -25,7 +25,7 @@ _PASSING = ("wait a moment", "Wait until")
 
 
 class Row(BaseModel):
-    """What was measured."""
+    """Measurements of one scenario in one phase of the cycle."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -169,7 +169,7 @@ async def _next_fruit(rig: Rig, wrong: list[str]) -> None:
 
 
 def disagreements(rig: Rig, accepted_before: int) -> list[str]:
-    """Where wire and records do not tell one story.
+    """Return the contradictions between the wire and the records, in words.
 
     Args:
         rig: the station.

@@ -27,7 +27,7 @@ _ABORT = struct.pack("ii", 1, 0)
 
 
 class Kind(StrEnum):
-    """What is done to a link."""
+    """Kind of a link's disturbance."""
 
     DELAY = "delay"
     """Each segment is held back for up to 0.2 s."""

@@ -74,7 +74,7 @@ def _section(title: str, lines: Sequence[str]) -> list[str]:
 
 
 def _days(rows: Sequence[Row]) -> str:
-    """How many rows were played on which day: a run of some scenarios leaves the others as they were."""
+    """Return the number of rows played on each day, in words: a run of some scenarios leaves the others' rows."""
     days = Counter(row.played_on for row in rows)
     return ", ".join(f"{days[day]} {f'on {day}' if day else 'on an earlier day'}" for day in sorted(days))
 

@@ -101,7 +101,7 @@ class Rig:
         self.wire.trigger()
 
     async def jaws_open(self) -> bool:
-        """Whether the jaws stand open, by the twin's truth."""
+        """Return whether the jaws are open, by the twin's truth."""
         return (await self.twin(do="state"))["width_mm"] > _JAWS_OPEN_MM
 
     async def watch_arm(self) -> None:
@@ -136,11 +136,11 @@ class Rig:
         await self.twin(do="clear", device="arm", fault="slow")
 
     async def reached(self, phase: Phase, accepted_before: int) -> bool:
-        """Whether the cycle has got to a phase.
+        """Return whether the cycle has reached a phase.
 
         Args:
-            phase: which one.
-            accepted_before: how many triggers had been accepted before this fruit.
+            phase: of this fruit's cycle.
+            accepted_before: number of triggers accepted before this fruit.
         """
         if len(self.wire.accepted) <= accepted_before:
             return False

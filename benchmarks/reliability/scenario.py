@@ -87,7 +87,7 @@ Fault = DeviceFault | ProcessFault | DiskFault | ClockFault | NestFault | PlcFau
 
 
 class Expected(_Checked):
-    """What has to come of the fruit."""
+    """Expected outcome of the fruit, with its reasons."""
 
     outcomes: tuple[Literal["PASS", "FAIL", "NO_RESULT"], ...]
     reasons: tuple[Reason, ...] = ()
@@ -116,7 +116,7 @@ class Scenario(_Checked):
     remark: str = ""
 
     def of(self, phase: Phase) -> Expected:
-        """What is expected in a phase.
+        """Return the expected outcome in a phase.
 
         Args:
             phase: one of the scenario's.

@@ -53,7 +53,7 @@ class Wire:
 
     @property
     def ready(self) -> bool:
-        """Whether a trigger would be accepted and nothing is open."""
+        """True while a trigger would be accepted and nothing is open."""
         return self._program.free and self._now("trigger_ready")
 
     @property
@@ -73,7 +73,7 @@ class Wire:
 
     @property
     def result_valid(self) -> bool:
-        """Whether a result can be read now."""
+        """True while a result can be read."""
         return self._now("result_valid")
 
     @property
@@ -83,12 +83,12 @@ class Wire:
 
     @property
     def completing(self) -> bool:
-        """Whether the arm still leaves the last fruit."""
+        """True while the arm still leaves the last fruit."""
         return self.packml == "completing"
 
     @property
     def standing(self) -> str:
-        """Where the PLC's program is and what the station's status bits are, in words."""
+        """Stage of the PLC's program and the station's status bits, in words."""
         if self._inputs is None:
             return f"PLC {self._program.stage}, the interface does not answer"
         bits = BY_NAME["status"].names(int(self._inputs["status"]))

@@ -53,7 +53,7 @@ _START_S = 120.0
 
 
 class Cell(NamedTuple):
-    """What runs."""
+    """Running parts of the soak: the station with its PostgreSQL, the bare server and the line."""
 
     site: Configuration
     server: Server

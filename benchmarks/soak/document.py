@@ -55,7 +55,7 @@ The log's newest 1,000 lines fill in some 40 minutes, at 0.34 kB a line.\
 
 
 class Ending(NamedTuple):
-    """How the run ended."""
+    """End of a run: fruit by decision, and the inspections that PostgreSQL did not get."""
 
     decided: dict[str, int]
     """Fruit by the line's decision."""
@@ -72,11 +72,11 @@ class Series(NamedTuple):
 
     @property
     def slope(self) -> Slope | None:
-        """How it rises; None for too few samples."""
+        """Slope with its interval; None for too few samples."""
         return slope(self.at_s, self.values)
 
     def below(self, limit: float) -> Verdict:
-        """Whether it rises by less than a limit in an hour.
+        """Return whether the series rises by less than a limit in an hour; `UNDECIDED` where it is too short for that.
 
         Args:
             limit: in the series' own unit.

@@ -39,7 +39,7 @@ class ProcessSample(NamedTuple):
 
 
 class StationCounts(NamedTuple):
-    """What the station's metrics had counted at one time."""
+    """Values of the station's metrics at one time."""
 
     fruit: float
     own_s: float
@@ -53,7 +53,7 @@ class StationCounts(NamedTuple):
 
 
 class Latency(NamedTuple):
-    """What a PLC that reads each scan waited for its replies in one window."""
+    """Response times to a PLC that reads each scan, in one window."""
 
     p50_us: float
     p99_us: float

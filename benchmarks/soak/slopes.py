@@ -13,7 +13,7 @@ FEWEST = 8
 
 
 class Verdict(StrEnum):
-    """What an interval decides about a limit."""
+    """Decision of a slope's interval about a limit."""
 
     YES = "yes"
     NO = "no"
@@ -28,7 +28,7 @@ class Slope(NamedTuple):
     high: float
 
     def below(self, limit: float) -> Verdict:
-        """Whether the true slope is below a limit, for each hour."""
+        """Return whether the true slope is below a limit, per hour; `UNDECIDED` if the interval contains it."""
         if self.high < limit:
             return Verdict.YES
         return Verdict.NO if self.low >= limit else Verdict.UNDECIDED

@@ -32,7 +32,7 @@ Source = Callable[[Closing], Pressed | None]
 
 
 class Found(NamedTuple):
-    """What `station calibrate` found of a unit."""
+    """Calibration of a unit, as `station calibrate` found it."""
 
     unit: int
     """Seed of its light."""
@@ -43,7 +43,7 @@ class Found(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Practice:
-    """What of the station is used."""
+    """Practices of the station that are used."""
 
     size: str = "length"
     """`length` by the grader, `class`, or `none`."""
@@ -127,17 +127,17 @@ def inspect(task: Task, recipe: Recipe, practice: Practice, source: Source) -> I
 
 
 def move_mm(step: Step, recipe: Recipe, shift_mm: tuple[float, float]) -> tuple[float, float] | None:
-    """How the arm moves so that a contact comes to the field's middle, as the contact's way in the image.
+    """Return the arm's move that brings a contact to the field's middle, as the contact's way in the image, mm.
 
     The usual scale serves: its 9 % are a tenth of a millimetre of the way.
 
     Args:
-        step: whose contact.
-        recipe: from where on it is centred.
-        shift_mm: how the arm has moved already, likewise.
+        step: with the contact.
+        recipe: with the offset from which on a contact is centred.
+        shift_mm: the arm's moves so far, likewise.
 
     Returns:
-        mm, to the arm's repeatability; None where the contact is near enough, too far off, or was not seen.
+        x and y, to the arm's repeatability; None where the contact is near enough, too far off, or was not seen.
     """
     from_mm = recipe.press.centre_from_mm
     if step.offset_px is None or from_mm is None:
@@ -182,7 +182,7 @@ def as_stopped(
 
 
 def seconds(steps: Sequence[Step], recipe: Recipe) -> float:
-    """How long the steps after the onset take: motion, settling and frames.
+    """Return the time of the steps after the onset, s: motion, settling and frames.
 
     Args:
         steps: of one closing, the onset's first; may be none.
@@ -222,7 +222,7 @@ def _scale(specimen: Specimen, practice: Practice) -> tuple[float, float]:
 
 
 def _size(specimen: Specimen, recipe: Recipe, practice: Practice) -> FruitSize:
-    """What the PLC writes; a fruit outside all of the recipe's classes has none."""
+    """Return the size that the PLC writes; without a class for a fruit outside all of the recipe's classes."""
     if practice.size == "length":
         return FruitSize(length_mm=specimen.graded_mm)
     rule = recipe.damage.size

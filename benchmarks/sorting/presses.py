@@ -72,7 +72,7 @@ class Step(NamedTuple):
 
 
 class Pressed(NamedTuple):
-    """What was measured; no steps where nothing was touched."""
+    """Measurements of one closing; no steps where nothing was touched."""
 
     onset_mm: float | None
     """As the gripper reads it."""

@@ -40,7 +40,7 @@ def wilson(count: int, of: int) -> tuple[float, float]:
 
 
 def is_error(one: Inspected) -> bool:
-    """Whether a fruit went the wrong way: a sound one that did not pass, a damaged one that did.
+    """Return whether a fruit went the wrong way: a sound one that did not pass, a damaged one that did.
 
     Args:
         one: the fruit.
@@ -49,7 +49,7 @@ def is_error(one: Inspected) -> bool:
 
 
 def share(group: Sequence[Inspected]) -> str:
-    """How many of a group went the wrong way, with the interval.
+    """Return the share of a group that went the wrong way, with its interval, as a table's cell.
 
     Args:
         group: the fruit; may be none.
@@ -84,7 +84,7 @@ def errors(inspected: Iterable[Inspected]) -> list[str]:
 
 
 def worth(by_practice: Mapping[str, Iterable[Inspected]]) -> list[str]:
-    """What size, centring, second press and calibration are each worth: both errors without it.
+    """Return a table of both errors by practice: the worth of size, centring, second press and calibration.
 
     Args:
         by_practice: the same fruit, inspected by each practice.

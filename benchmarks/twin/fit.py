@@ -174,7 +174,7 @@ def _cosines(image: npt.NDArray[np.uint8]) -> FloatArray:
 
 
 def free_of_contact(press: Press) -> npt.NDArray[np.bool_]:
-    """Where the press cannot be seen.
+    """Return a mask of the sensor's shape, True where the press cannot be seen.
 
     Args:
         press: the annotation.

@@ -27,7 +27,7 @@ class NoMetrics:
 
 @dataclass(slots=True)
 class Cell:
-    """What outlives the station's process: the nest, the jaws, the disk's content."""
+    """Cell that outlives the station's process: the nest, the jaws, the disk's content."""
 
     clock: Clock
     rng: random.Random

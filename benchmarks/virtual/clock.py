@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 
 class Timer:
-    """What happens at one moment, until it is cancelled."""
+    """Action at one moment, until it is cancelled."""
 
     __slots__ = ("_what",)
 

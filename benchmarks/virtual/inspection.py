@@ -57,7 +57,7 @@ class Inspection:
     standing: bool = False
 
     def press(self) -> Press:
-        """What was seen so far, of all presses together."""
+        """Return all presses together as one, with what was seen so far."""
         latest = Press(
             self.onset_mm, 0.4, tuple(self.captured[: self.seen]), tuple(self.interruptions), resolution_mm=0.4
         )
@@ -87,7 +87,7 @@ def point(fruit: Fruit | None, closing_mm: float, trouble: str | None, rng: rand
 
 @lru_cache(maxsize=100_000)
 def ends_steps(press: Press) -> bool:
-    """Whether the judge lets no further step be made."""
+    """Return whether the judge allows no further step."""
     return early_stop(press, RECIPE) is not None
 
 

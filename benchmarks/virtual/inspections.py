@@ -12,7 +12,7 @@ RECORD_NO_RESULT_S = 1.0
 
 
 class Inspections:
-    """What has begun in this process."""
+    """Inspections that began in this process."""
 
     def __init__(self, cell: Cell) -> None:
         self.cell = cell

@@ -36,7 +36,7 @@ _OUTCOME_GRACE_S = 1.0
 
 @dataclass(slots=True)
 class Machine:
-    """What outlives the interface's process."""
+    """Parts that outlive the interface's process: the journal among them."""
 
     clock: Clock
     rng: random.Random
@@ -66,7 +66,7 @@ class Interface:
 
     @property
     def has_writer(self) -> bool:
-        """Whether the PLC has the right to write."""
+        """True while the PLC has the right to write."""
         return self._state.writer
 
     def kill(self) -> None:

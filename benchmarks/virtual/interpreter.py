@@ -76,7 +76,7 @@ class Interpreter(Inspections):
 
     @property
     def state(self) -> State:
-        """Where the cycle is."""
+        """Present state of the cycle."""
         return self.cycle.state
 
     def post(self, event: Event) -> None:

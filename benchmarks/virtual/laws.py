@@ -38,7 +38,7 @@ class LawBrokenError(AssertionError):
 
 
 class Laws:
-    """What was seen of one play so far."""
+    """Checker of the laws in one play, with what was seen of the play so far."""
 
     def __init__(self, recipe: Recipe, records: Mapping[int, Record]) -> None:
         self._recipe, self._records = recipe, records

@@ -44,7 +44,7 @@ class _Plan(FaultPlan):
 
 @dataclass(slots=True)
 class Report:
-    """What came of a play."""
+    """Result of a play: triggers, decisions, simulated time, and the broken law."""
 
     triggers: int = 0
     """Given by the PLC, refused ones among them."""

@@ -60,7 +60,7 @@ def verification(calibration, made_at, *checks):
 
 
 def in_use(home, after, serial="T0001", **settings):
-    """What the station sees some time after the calibration was made."""
+    """Return the active calibration as the station has it at a time after it was made."""
     service = {"uncalibrated": settings.pop("uncalibrated", "refuse")}
     configuration = Configuration.model_validate({"home": home, "calibration": settings, "service": service})
     return ActiveCalibration(configuration, lambda: serial, after.timestamp)
@@ -206,7 +206,7 @@ async def inspected(site, store, calibration):
 
 
 async def glance(configuration):
-    """What the pages are told."""
+    """Return the state that the pages receive."""
     async with ChannelClient(panel_endpoint(configuration.hmi, configuration.home), "the station") as client:
         return await client.request(GetPanelState(), PanelState, deadline_s=20)
 

@@ -19,7 +19,7 @@ def shapes(chart, kind):
 
 
 def start(path):
-    """Where a path begins."""
+    """Return the point where a path begins."""
     x, y = path.get("d")[1:].split("h")[0].split("l")[0].split("V")[0].split(" ")
     return float(x), float(y)
 

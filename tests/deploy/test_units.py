@@ -106,7 +106,7 @@ def test_a_device_that_is_plugged_in_later_is_allowed_too(root):
 
 
 def test_the_station_is_started_again_without_end(root):
-    """Where a switch boots slower than this machine, its address comes after any number of starts."""
+    """The address of a switch that boots slower than this machine comes after any number of starts."""
     found = unit(root, "fruit-station.service")
     assert found["Unit"]["StartLimitIntervalSec"] == ["0"]
     assert found["Service"]["Restart"] == ["on-failure"]

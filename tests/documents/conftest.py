@@ -127,7 +127,7 @@ class Page:
 
     @cached_property
     def said(self) -> list[Said]:
-        """What its console blocks say, in order."""
+        """Commands in the page's console blocks with their expected output, in order."""
         said: list[Said] = []
         for token in self.tokens:
             if token.type == "fence" and token.info.startswith("console") and token.map:

@@ -49,7 +49,7 @@ def check_values(command, context, values, *, whole):
 
 
 def station_problem(command, words, *, whole):
-    """What is wrong with a command line, without carrying it out; None for nothing."""
+    """Return the fault of a command line, without carrying it out; None if there is none."""
     context = click.Context(command, info_name=command.name)
     try:
         values, rest, _ = command.make_parser(context).parse_args(list(words))
@@ -72,7 +72,7 @@ def run_commands(root):
 
 
 def problem(words, root, *, whole):
-    """What is wrong with a command of the project; None for nothing."""
+    """Return the fault of a command of the project; None if there is none."""
     words = [word for word in words if word not in {"...", "…"}]
     if words[0] == "./run":
         if words[1:2] and words[1] not in run_commands(root):

@@ -53,7 +53,7 @@ def slug(title):
 
 
 def faults(found):
-    """What of one record is not as all records are."""
+    """Yield what is wrong with one record's file name, status and sections."""
     number, _, title = found.title.removeprefix("# ").partition(". ")
     if found.path.name != f"{int(number):04d}-{slug(title)}.md":
         yield "the file is not named by number and title"

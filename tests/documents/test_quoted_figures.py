@@ -22,7 +22,7 @@ def text(root):
 
 
 def block(page, name):
-    """What a benchmark has written between its marks."""
+    """Return the text that a benchmark has written between its marks."""
     [found] = re.findall(rf"<!-- {name} -->\n(.*?)<!-- /{name} -->", page, re.DOTALL)
     return found
 

@@ -99,7 +99,7 @@ class Cell:
         ask_twin("127.0.0.1", self.console, request, PATIENCE_S)
 
     def ask_line(self, *requests: tuple[Any, Any]) -> list[Any]:
-        """What the PLC interface asks, by hand."""
+        """Send requests to the station as the PLC interface does; return the replies."""
         return run_apart(self._ask(line_endpoint(self.configuration.handshake, self.configuration.home), requests))
 
     def state(self) -> PanelState | None:
@@ -128,7 +128,7 @@ class Cell:
         self.until(lambda state: state.ready)
 
     def _settled(self) -> bool:
-        """Whether the PLC interface has seen each start of the service: it calls off what it did not trigger itself."""
+        """Return whether the PLC interface has seen each start of the service: it calls off what it did not trigger."""
         log = (self.folder / "station.log").read_text()
         return log.count("what was open is settled") > log.count("the process service ended")
 

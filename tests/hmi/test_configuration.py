@@ -29,7 +29,7 @@ def file(pages, tmp_path):
 
 @pytest.fixture
 def noted(pages, monkeypatch) -> list[PersonNoted]:
-    """What is sent to the audit trail."""
+    """Collect the notes that are sent to the audit trail."""
     sent: list[PersonNoted] = []
     monkeypatch.setattr(pages.context.gateway, "note", lambda note: asyncio.sleep(0, sent.append(note)))
     return sent

@@ -108,7 +108,7 @@ def test_it_is_known_of_every_order_who_may_give_it():
 
 @pytest.mark.parametrize("path", ORDERS)
 def test_an_order_is_refused_to_every_role_without_its_right(as_role, path):
-    """Who has the right gets an answer about the form, or about the station, which is away here."""
+    """A role that has the right gets an answer about the form, or about the station, which is away here."""
     for role in Role:
         pages = as_role(role)
         status = pages.post(filled(path), csrf=pages.token())[0]

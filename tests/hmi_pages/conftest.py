@@ -129,7 +129,7 @@ class Site:
         return self.asked(lambda client: client.request(request, CommandDone, deadline_s=40))
 
     def ready(self) -> bool:
-        """Whether fruit is taken; where not, a person resets: on a busy machine moves come late, which stops it."""
+        """Return whether fruit is accepted; if not, reset as a person does: on a busy machine late moves stop it."""
         if self.state().ready:
             return True
         self.order(CommandName.RESET)

@@ -466,7 +466,7 @@ def growing_to(area_mm2: float, *flags: Flag) -> Press:
 
 
 def stopped(press: Press, recipe: Recipe) -> list[bool]:
-    """Whether the steps end, after each point."""
+    """Return for each point of a press whether the steps end after it."""
     return [
         early_stop(replace(press, points=press.points[:number]), recipe) is not None
         for number in range(1, len(press.points) + 1)

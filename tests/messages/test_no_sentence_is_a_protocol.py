@@ -18,7 +18,7 @@ TEXT_METHODS = {
 
 
 def says(node):
-    """Whether an expression is a sentence of ours: a name of what is said, or its text."""
+    """Return whether an expression is a sentence of ours: a name in `SAID`, or a call on one."""
     if isinstance(node, ast.Call):
         if isinstance(node.func, ast.Name) and node.func.id == "str" and node.args:
             return says(node.args[0])
@@ -28,7 +28,7 @@ def says(node):
 
 
 def words(node):
-    """Whether an expression is a literal of several words."""
+    """Return whether an expression is a literal of several words."""
     return isinstance(node, ast.Constant) and isinstance(node.value, str) and len(node.value.split()) > 1
 
 

@@ -32,7 +32,7 @@ EACH = {
 
 
 def summaries(connection):
-    """What is stored, and what the inspections say."""
+    """Return the stored summaries, and those computed from the inspections."""
     stored = {name: f"SELECT * FROM {name} WHERE inspections <> 0" for name in EACH}
     return tuple(
         {name: sorted(connection.execute(query).fetchall()) for name, query in queries.items()}

@@ -37,7 +37,7 @@ def now() -> Moment:
 
 
 class Rig:
-    """What a test says of the station, and the interface in front of it."""
+    """Station that a test makes up, and the PLC interface in front of it."""
 
     def __init__(self, port: int, order: WordOrder) -> None:
         self.port = port
@@ -183,7 +183,7 @@ def vocabulary() -> set[str]:
 
 @pytest.fixture
 def no_contact() -> dict[str, Any]:
-    """What changes in an outcome where nothing was touched."""
+    """Return the changes of an outcome where nothing was touched."""
     return {
         "outcome": "NO_RESULT", "reasons": (Reason.NO_CONTACT, Reason.LOW_CONFIDENCE), "area_mm2": None,
         "area_px": None, "closing_mm": None, "confidence": None, "partial": True,

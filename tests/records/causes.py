@@ -7,5 +7,5 @@ from station.records.errors import RecordsError
 
 
 def because(*causes: Definition) -> Callable[[RecordsError], bool]:
-    """Whether an error has one of these causes."""
+    """Return a check that an error has one of these causes."""
     return lambda error: error.cause.id in {each.id for each in causes}

@@ -81,7 +81,7 @@ def test_a_killed_station_keeps_every_begun_inspection(opened, scenario, folder,
 
 
 def _written_until_killed(nursery, after_lines):
-    """What one station said before it was killed, at a random moment after so many lines."""
+    """Return the lines that one station printed until it was killed, at a random moment after so many lines."""
     nursery.stdin.write("go\n")
     nursery.stdin.flush()
     lines = []

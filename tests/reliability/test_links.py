@@ -38,7 +38,7 @@ async def echoed() -> AsyncIterator[tuple[Link, asyncio.StreamReader, asyncio.St
 
 
 def disturbed(kind: Kind, lasts_s: float, sent: bytes) -> tuple[bytes, Disturbance]:
-    """What comes back of some bytes, up to the connection's end or a second of silence."""
+    """Return what comes back of some bytes, up to the connection's end or a second of silence, and the disturbance."""
     return asyncio.run(_disturbed(kind, lasts_s, sent))
 
 

@@ -56,7 +56,7 @@ LINE = Line(plc_connected=True, plc_alive=True, enabled=True, waiting=0, counter
 
 @dataclass
 class LineClient:
-    """What the PLC interface does, by hand."""
+    """Client in the place of the PLC interface, with its requests by hand."""
 
     client: ChannelClient
     ids: Any = field(default_factory=lambda: itertools.count(1))
@@ -219,7 +219,7 @@ def roomy(settings_file: Callable[..., Path], tmp_path: Path) -> Callable[..., P
 
 @pytest.fixture
 def line_client() -> type[LineClient]:
-    """What the PLC interface does, by hand, over a channel."""
+    """Return the class of the client that sends the PLC interface's requests by hand, over a channel."""
     return LineClient
 
 

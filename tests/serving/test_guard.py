@@ -49,7 +49,7 @@ class Door:
             await writer.wait_closed()
 
     async def ask(self, source=STRANGER, request=ASK):
-        """Whether a new connection's request is answered."""
+        """Return whether a new connection's request is answered."""
         reader, writer = await self.come(source)
         writer.write(request)
         return await answered(reader)
@@ -70,7 +70,7 @@ async def ended(reader):
 
 
 def files():
-    """How many files this process has open, the connections of clients and server among them."""
+    """Count the files that this process has open, the connections of clients and server among them."""
     return len(list(Path("/proc/self/fd").iterdir()))
 
 

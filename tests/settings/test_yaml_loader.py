@@ -22,7 +22,7 @@ PLAIN = "write it out without anchors, aliases and tags"
 
 
 def alike(word, hint="write", place="f:1: a"):
-    """What is said of a word with more than one meaning."""
+    """Return the expected problems for a word with more than one meaning."""
     return [f'{place}: {ALIKE} {word}: {hint} "{word}" in quotes for a text']
 
 
@@ -202,7 +202,7 @@ def by_ruamel(content):
 
 
 def is_read_alike(content):
-    """Whether a content is accepted; if so, ruamel.yaml finds the same data or refuses it."""
+    """Return whether a content is accepted; if so, check that ruamel.yaml finds the same data or refuses it."""
     document = parse_document(content, "f")
     if document.problems:
         return False

@@ -19,7 +19,7 @@ from station.supervision.supervisor import RESTARTS, SupervisionError
 
 
 def environment(pid):
-    """What a process was started with."""
+    """Return the environment that a process was started with."""
     return psutil.Process(pid).environ()
 
 

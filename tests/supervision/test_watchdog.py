@@ -11,7 +11,7 @@ from station.supervision import supervisor as supervising
 
 @pytest.fixture
 def systemd(tmp_path, monkeypatch):
-    """What systemd's end of the socket has heard, line by line."""
+    """Yield a function that returns what systemd's end of the socket has received, line by line."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
         listening.bind(str(tmp_path / "systemd"))
         listening.settimeout(0.0)

@@ -58,7 +58,7 @@ PORTS = {
 
 
 async def heard(client: socket.socket, request: bytes, said: bytes) -> bytes:
-    """What a client hears until something is said, or its connection ends, as it has to where nothing is."""
+    """Send a request; return what comes back until `said` does or the connection ends: one of both within 10 s."""
     answer = b""
     async with asyncio.timeout(10):
         with contextlib.suppress(OSError):

@@ -49,7 +49,7 @@ def fitted(change, first_guess=ALL, before=None):
 
 
 def left(change, found):
-    """What the fit leaves of a change, without the noise, at half the working size."""
+    """Return what the fit leaves of a change, without the noise, at half the working size."""
     return np.abs(halved(change) - found.levels)
 
 

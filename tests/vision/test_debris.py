@@ -17,7 +17,7 @@ SHAPE = (320, 240)
 
 
 def bump(radius, levels, x=120.0, y=160.0):
-    """What a dent of that radius adds: a ring of slope, of one sign on either side."""
+    """Return the grey levels that a dent of that radius adds: a ring of slope, of one sign on either side."""
     rows, columns = np.mgrid[: SHAPE[0], : SHAPE[1]]
     away = np.hypot(columns - x, rows - y)
     ring = np.exp(-np.square((away - radius) / 3.0)) * (columns - x) / np.maximum(away, 1)

@@ -18,7 +18,7 @@ def away(x=60.0, y=80.0):
 
 @pytest.fixture
 def moved(background_of):
-    """What a noisy change with a given contact hands to the search for regions."""
+    """Return a function that prepares a noisy change with a given contact for the search for regions."""
 
     def make(change, seed=0, noise_levels=1.0):
         noisy = (change + np.random.default_rng(seed).normal(0, noise_levels, (*SHAPE, 3))).astype(np.float32)

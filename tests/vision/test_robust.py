@@ -246,7 +246,7 @@ def test_a_contact_of_which_the_border_cuts_only_the_halo_ends_at_its_edge():
 
 
 def untouched(unit, drift, after_s=3.0, dead_led=None):
-    """What is measured on a unit of the twin some time after its reference, with nothing touching."""
+    """Measure a unit of the twin some time after its reference, with nothing touching."""
     condition = Condition(dead_led=dead_led)
     sensor = DigitSensor(unit, unit, drift=drift)
     references = [sensor.frame(None, frame / 30, condition) for frame in range(5)]
@@ -265,7 +265,7 @@ def test_drift_is_no_contact(drift, dead_led):
 
 
 def weak_touch(kind, seed, without=frozenset()):
-    """What is measured of a contact of 1 mm², and its area over the truth's."""
+    """Measure a contact of 1 mm²; return it, and its area over the truth's."""
     fruit, gel = draw_fruit(kind, seed), Gel()
     on_gel, squeeze = FruitOnGel(fruit, Pose(), gel), Squeeze(fruit, gel)
     closings = np.geomspace(0.002, 1.0, 40)

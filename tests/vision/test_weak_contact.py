@@ -36,7 +36,7 @@ def drift(generator, levels):
 
 
 def dent(levels, place=PLACE, sigma_px=3.0):
-    """What a small round dent shows: each colour the slope along its own light."""
+    """Return the change of a small round dent: each colour is the slope along its own light."""
     y, x = np.mgrid[: SHAPE[0], : SHAPE[1]].astype(np.float32)
     x, y = (x - place[0]) / sigma_px, (y - place[1]) / sigma_px
     depth = np.exp((1 - x * x - y * y) / 2)

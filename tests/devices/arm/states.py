@@ -28,7 +28,7 @@ async def cause_of(awaitable) -> ArmCause:
 
 
 async def is_young(arm: UrArm) -> bool:
-    """Whether the state came just now, which on a busy machine not each one does."""
+    """Return whether the state is less than 0.1 s old, which on a busy machine not each one is."""
     age_s = (await arm.state()).age_s
     return age_s is not None and 0.0 <= age_s < 0.1
 

@@ -78,7 +78,7 @@ def test_a_stop_by_the_watchdog_is_told_with_the_state_that_shows_it_also_after_
     controller.kickWatchdog = kick
 
     async def told_after(share):
-        """Whether kicks are late with a stop so long after the kick's begin, in shares of the watchdog's limit."""
+        """Return whether kicks are late with a stop `share` of the watchdog's limit after the kick's begin."""
         controller.state, controller.kicks, controller.looks, now.s = PLAYING, 0, 0, now.s + 100.0
         assert process._prepare()
         process._healthy_until_s, begun_s = now.s + 0.5 / WATCHDOG_HZ, now.s

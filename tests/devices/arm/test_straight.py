@@ -60,7 +60,7 @@ class Link:
 
 @pytest.fixture
 def is_straight():
-    """Whether the arm goes straight to a pose from where it was found after its last motion."""
+    """Return a check that the arm goes straight to a pose from where it was found after its last motion."""
 
     def ask(last, found_rad, pose):
         async def run():

@@ -23,7 +23,7 @@ async def fresh(camera, deadline_s=3.0):
 
 
 async def refusal(settings, port: int) -> Message:
-    """Why a camera does not open, with a longer limit where a busy machine has tried nothing yet.
+    """Return why a camera does not open, with a longer limit where a busy machine has tried nothing yet.
 
     Args:
         settings: fixture `twin_settings`.

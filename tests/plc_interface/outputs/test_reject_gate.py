@@ -16,7 +16,7 @@ LEASE_S = 40.0
 
 
 def outcome(sequence, name, encoder, **changes):
-    """What the gate looks at; PASS is a sure one."""
+    """Return an outcome with the fields that the gate reads; PASS is a sure one."""
     measured: dict[str, Any] = {"area_mm2": 12.3, "late": False, "simulated": False}
     return Outcome.model_construct(sequence=sequence, outcome=name, encoder=encoder, **(measured | changes))
 

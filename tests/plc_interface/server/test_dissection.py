@@ -42,7 +42,7 @@ def tshark() -> str:
 
 
 def talk(wire, requests) -> list[tuple[bytes, bytes]]:
-    """What went over the wire: each request with its answer, byte for byte."""
+    """Send requests, and return what went over the wire: each request with its response, byte for byte."""
     exchanges = []
     for message in requests:
         request, answer = wire.request(message), b""

@@ -34,7 +34,7 @@ LINE_HEAD_BYTES = 60
 
 
 class Capture:
-    """What a server sent, as a file for tshark: no right to listen on a network is needed.
+    """Capture file, for tshark, of what a server sent: no right to listen on a network is needed.
 
     Source: libpcap's file format 2.4 with link type 101, raw IP.
     """

@@ -195,7 +195,7 @@ class TestStrangers:
 
 
 def is_ended(client):
-    """Whether the server has closed a connection from which no byte is to come."""
+    """Return whether the server has closed a connection from which no byte is to come."""
     try:
         return client.recv(1) == b""
     except BlockingIOError:

@@ -19,7 +19,7 @@ BEATS = 10
 
 
 def plc_health(port):
-    """What `/readyz` reports of the PLC, whether the station is ready or not."""
+    """Return the PLC's state as `/readyz` reports it, whether the station is ready or not."""
     try:
         answer = urllib.request.urlopen(f"http://127.0.0.1:{port}/readyz", timeout=20)
     except urllib.error.HTTPError as error:

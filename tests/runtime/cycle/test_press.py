@@ -18,7 +18,7 @@ from tests.stored_inspection import read_record
 
 @pytest.fixture
 def measurements(monkeypatch):
-    """What the station's method was given and gave: for each image the contact of the step before, and its own.
+    """Record for each image the contact of the step before, which the method was given, and its own, which it gave.
 
     The changed area is given as twice the area, and with `lost` set every contact's edge counts as lost.
     """

@@ -22,7 +22,7 @@ REACHED_RAD = 0.02
 
 
 def forgive_nothing(now_s: float) -> None:
-    """What a controller does that has stood still and has its watchdog expire all the same."""
+    """Do nothing, in place of `stood_still`: the controller's watchdog expires also where it has stood still itself."""
 
 
 def active(cell):

@@ -140,7 +140,7 @@ FORGOTTEN = {
 
 
 class Laws:
-    """What holds from step to step, by what came in and what can be seen; it knows neither rows nor timers."""
+    """Laws that every step of the handshake keeps, by what came in and what can be seen, not by its table's rows."""
 
     def __init__(self, settings: HandshakeSettings) -> None:
         self.settings = settings

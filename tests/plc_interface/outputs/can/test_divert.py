@@ -19,7 +19,7 @@ from station.messages import can as messages
 
 
 def says(definition):
-    """Whether an error's message, or one that it encloses, is of this definition."""
+    """Return a check that an error's message, or one that it encloses, is of this definition."""
     return lambda error: definition.id in error.message.ids()
 
 

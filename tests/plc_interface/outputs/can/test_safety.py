@@ -14,7 +14,7 @@ UP = messages.COMING_UP()
 
 
 def says(definition):
-    """Whether an error's message, or one that it encloses, is of this definition."""
+    """Return a check that an error's message, or one that it encloses, is of this definition."""
     return lambda error: definition.id in error.message.ids()
 
 

@@ -69,7 +69,7 @@ class LogixBlock:
         self._run(self._statements)
 
     def prescan(self) -> None:
-        """What the controller does with it between PROG and the first scan."""
+        """Run the routine Prescan, as the controller does between PROG and the first scan."""
         self._run(self._prescan)
 
     def _initial(self, kind: str) -> Any:

@@ -22,7 +22,7 @@ def nodes(node: Node) -> Iterator[Node]:
 
 
 def accepted(source: str) -> bool:
-    """Whether the text is the standard's, with a semicolon after every statement."""
+    """Return whether the text follows the standard, with a semicolon after every statement."""
     root = Parser(Language(standard.language())).parse(source.encode()).root_node
     return not root.has_error and all(
         node.next_sibling is not None and node.next_sibling.type == "empty_statement"
