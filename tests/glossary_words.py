@@ -1,5 +1,6 @@
 """Check of the glossary's words: finds words of its last column in names, docstrings' first lines and documents.
 
+A docstring's first line that is a question clause is found too; of tests and benchmarks only that is.
 `python -m tests.glossary_words` prints each place and exits with 1 if there is one; `./run check` calls it.
 """
 
@@ -93,7 +94,7 @@ def finder(words: Iterable[str]) -> Callable[[str], list[str]]:
 def of_module(file: str, source: str, find: Callable[[str], list[str]]) -> Iterator[Finding]:
     """Yield the findings in a module's name, in the names of its definitions, and in docstrings' first lines.
 
-    A module's first line that is a question clause is one too.
+    A first line that is a question clause is one too.
     """
     yield from (Finding(file, 1, Path(file).stem, word) for word in find(spaced(Path(file).stem)))
     for node in ast.walk(ast.parse(source)):
@@ -103,7 +104,7 @@ def of_module(file: str, source: str, find: Callable[[str], list[str]]) -> Itera
         if not isinstance(node, ast.Module):
             yield from (Finding(file, line, node.name, word) for word in find(spaced(node.name)))
         first = (ast.get_docstring(node) or "").partition("\n")[0]
-        if isinstance(node, ast.Module) and (question := QUESTION.match(first)):
+        if question := QUESTION.match(first):
             yield Finding(file, line, first, question[0])
         yield from (Finding(file, line, first, word) for word in find(without_code(first)))
 
@@ -137,10 +138,12 @@ def findings() -> Iterator[Finding]:
     listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "*.py", "*.md"]
     names = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\0")
     for name in names:
-        if not (ROOT / name).is_file() or name.startswith(("tests/", "benchmarks/", *HISTORY)):
+        if not (ROOT / name).is_file() or name.startswith(HISTORY):
             continue
         text = (ROOT / name).read_text("utf-8")
-        if name.endswith(".py"):
+        if name.startswith(("tests/", "benchmarks/")):
+            found = of_module(name, text, finder(())) if name.endswith(".py") else ()
+        elif name.endswith(".py"):
             found = of_module(name, text, find)
         elif name == GLOSSARY or OTHER_LANGUAGES.search(name):
             continue

@@ -43,6 +43,8 @@ def test_each_exception_is_one_of_a_word_of_the_glossary_that_is_still_there(wor
         ('def f():\n    """Tells an alarm."""', "tell"),
         ('"""Alarm manager: what stands."""', "stands"),
         ('"""Which alarms are active."""', "Which"),
+        ('class A:\n    """What it holds."""', "What"),
+        ('def is_open():\n    """Whether it is open."""', "Whether"),
     ],
 )
 def test_a_word_to_avoid_is_found_in_python(source, word):
