@@ -1,4 +1,4 @@
-"""What the emulated controller and the arm's driver cost, beside bare ur-rtde on the same controller.
+"""CPU of the emulated controller and of the arm's driver, beside bare ur-rtde on the same controller.
 
 Writes its table into docs/arm.md.
 """

@@ -1,4 +1,4 @@
-"""What the line's CAN costs: the gate's confirmation through the driver beside a bare python-can exchange.
+"""Latency and CPU of the line's CAN: the gate's confirmation by the driver beside a bare python-can exchange.
 
 The twin's nodes run in a process of their own, reached by udp_multicast; a real bus at 250 kbit/s adds about 0.5 ms for
 each frame. Prints the table and writes it into docs/plc/can.md.

@@ -1,4 +1,4 @@
-"""What the twin and the drivers cost together: CPU at 30 frames/s and 500 Hz RTDE, beside a bare ur-rtde client.
+"""CPU of the twin and the drivers together, at 30 frames/s and 500 Hz RTDE, beside a bare ur-rtde client.
 
 Run with `./run bench cell`. Writes `docs/cost.md`.
 """

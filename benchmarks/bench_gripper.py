@@ -1,4 +1,4 @@
-"""How long the gripper's wires take: the station's drivers beside a bare pymodbus client and pyRobotiqGripper.
+"""Latency of the gripper's wires: the station's drivers beside a bare pymodbus client and pyRobotiqGripper.
 
 All of them use one twin in a process of its own, one after the other, so the figures are those of the software, not
 of RS-485 or of a robot's network. Prints the table and writes it into docs/gripper.md.

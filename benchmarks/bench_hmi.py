@@ -1,4 +1,4 @@
-"""What the operators' pages cost: a first load, the processor with three clients at 10 Hz, and the PLC's latency.
+"""Cost of the operators' pages: a first load, the processor with three clients at 10 Hz, and the PLC's latency.
 
 Run with `./run bench hmi [SECONDS] [--rounds N]`: a whole demonstration with fruit after fruit; nobody looks, three
 panels take the page Run, ten readers page through the history and its images, three headless Chromiums show the page

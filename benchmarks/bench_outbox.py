@@ -1,4 +1,4 @@
-"""Three stations tell one PostgreSQL of their inspections, while it is stopped, killed, and its connections are cut.
+"""Three stations publish inspections to one PostgreSQL, while it is stopped, killed, and its connections are cut.
 
 Run with `./run bench outbox`: of 100,000 inspections none may be missing, doubled or out of order afterwards. Beside
 it, in the same run: the same events by psycopg's executemany, without any of that. Writes docs/outbox-speed.md. Exits 1
@@ -63,8 +63,8 @@ async def arrival(server: Server, wanted: int) -> None:
         await asyncio.sleep(0.2)
 
 
-async def tell(server: Server, home: Path, rows: int) -> tuple[float, dict[str, int]]:
-    """Write and tell at the same time, under trouble; how long it took and what was done to the server."""
+async def publish_under_trouble(server: Server, home: Path, rows: int) -> tuple[float, dict[str, int]]:
+    """Write and publish at the same time, under trouble; return the time it took, s, and the count of each trouble."""
     settings = OutboxPostgresqlSettings(enabled=True, host=str(server.folder), port=PORT, user="fruit", tls="disable")
     each = rows // STATIONS
     names = [f"station-{number}" for number in range(STATIONS)]
@@ -145,7 +145,7 @@ def main() -> int:
         return 1
     rows = arguments.rows // STATIONS * STATIONS
     with tempfile.TemporaryDirectory() as place, throwaway(bin_folder) as server:
-        took_s, done = asyncio.run(tell(server, Path(place), rows))
+        took_s, done = asyncio.run(publish_under_trouble(server, Path(place), rows))
         wrong = verify(server, rows)
         if arguments.json:
             print(json.dumps({"rows": rows, "done": done, "wrong": wrong}))

@@ -1,4 +1,4 @@
-"""How fast the PLC is answered: latency at a 10 ms scan and closed-loop throughput, alone and while vision works.
+"""Speed of the PLC server: latency at a 10 ms scan and closed-loop throughput, alone and while vision works.
 
 Our server beside a stock pymodbus server and one on libmodbus, asked for the same 20 registers by the same client
 program. Run with `./run bench plc [SECONDS]`; needs gcc and libmodbus-dev. Writes its tables into

@@ -1,4 +1,4 @@
-"""What it costs to make an inspection durable, to find it among millions, and to export: beside bare sqlite3.
+"""Cost of the records beside bare sqlite3: a durable inspection, a search among millions, and an export.
 
 An inspection is a begin, a conclusion with 13 curve points, and the note that it was published: three commits that
 somebody waits for, with synchronous=FULL. Prints the tables and writes docs/records-speed.md. The folder to write in

@@ -1,4 +1,4 @@
-"""What a station takes of a machine: cores, memory and disk by process and fruit, and what pinning is good for.
+"""Sizing of a station's machine: cores, memory and disk by process and fruit, and the effect of pinning.
 
 Run with `./run bench sizing [FRUITS]`. Writes the table of `docs/sizing.md`.
 """

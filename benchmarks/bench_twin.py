@@ -1,4 +1,4 @@
-"""How like a real DIGIT the twin's is, and what it costs: writes the tables and pictures of docs/twin.md.
+"""Likeness of the twin's DIGIT to a real one, and its cost: writes the tables and pictures of docs/twin.md.
 
 usage: bench_twin.py [--real FOLDER] [--side-by-side FOLDER]
 

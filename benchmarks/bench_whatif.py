@@ -1,4 +1,4 @@
-"""How many stored inspections a second the what-if judges: one core, two, and the judge alone beside them.
+"""Speed of the what-if in stored inspections a second: on one core, on two, and the judge alone beside them.
 
 `./run bench whatif [NUMBER]` writes docs/whatif-speed.md.
 """

@@ -1,4 +1,4 @@
-"""What every test lives under: nothing may outlive it, and a missing tool is an error where CI says so."""
+"""Rules and fixtures of every test: nothing may outlive it, and a missing tool is an error where CI says so."""
 
 import asyncio
 import functools
@@ -102,8 +102,8 @@ def _awaited(task: asyncio.Task[Any]) -> Iterator[str]:
         waiting = getattr(waiting, "cr_await", None) or getattr(waiting, "gi_yieldfrom", None)
 
 
-def _tell_tasks_of_a_timeout() -> None:
-    """Have a test that takes too long say where its tasks wait, beside its threads."""
+def _report_tasks_of_a_timeout() -> None:
+    """Have the report of a test that takes too long show where its tasks wait, beside its threads."""
     threads_alone = pytest_timeout.dump_stacks
 
     def dump_stacks(terminal: Any) -> None:
@@ -115,19 +115,19 @@ def _tell_tasks_of_a_timeout() -> None:
     pytest_timeout.dump_stacks = dump_stacks
 
 
-_tell_tasks_of_a_timeout()
+_report_tasks_of_a_timeout()
 
 
 def _has_children() -> bool:
     """Return whether there may be a child: reading /proc is fifty times quicker than a search of all processes."""
     try:
-        said = [path.read_text() for path in Path("/proc/self/task").glob("*/children")]
+        children = [path.read_text() for path in Path("/proc/self/task").glob("*/children")]
     except OSError:  # a thread has just ended
         return True
-    return not said or any(said)
+    return not children or any(children)
 
 
-class Living(NamedTuple):
+class ProcessSnapshot(NamedTuple):
     """Threads, processes, ports and tasks that are alive in this process and below it."""
 
     threads: frozenset[threading.Thread]
@@ -136,7 +136,7 @@ class Living(NamedTuple):
     tasks: frozenset[asyncio.Task[object]]
 
     @classmethod
-    def now(cls) -> "Living":
+    def now(cls) -> "ProcessSnapshot":
         me = psutil.Process()
         every = me.children(recursive=True) if _has_children() else []
         children = [child for child in every if child.status() != psutil.STATUS_ZOMBIE]
@@ -153,7 +153,7 @@ class Living(NamedTuple):
             frozenset(task for task in tasks if task is not None and not task.done()),
         )
 
-    def beyond(self, before: "Living") -> list[str]:
+    def beyond(self, before: "ProcessSnapshot") -> list[str]:
         """Return what is here now and was not before, in words."""
         new_threads = [thread.name for thread in self.threads - before.threads if thread.is_alive()]
         return [
@@ -167,10 +167,10 @@ class Living(NamedTuple):
 @pytest.fixture(autouse=True)
 def nothing_left_behind() -> Iterator[None]:
     """Fail a test that leaves a thread, process, listening port or asyncio task."""
-    before = Living.now()
+    before = ProcessSnapshot.now()
     yield
     deadline = time.monotonic() + GRACE_S
-    while left := Living.now().beyond(before):
+    while left := ProcessSnapshot.now().beyond(before):
         if time.monotonic() > deadline:
             pytest.fail(f"left behind: {', '.join(left)}", pytrace=False)
         threading.Event().wait(0.02)

@@ -1,1 +1,1 @@
-"""What the benchmarks and tests of the archive share: many inspections quickly, and a PostgreSQL to throw away."""
+"""Fixtures of the archive's benchmarks and tests: many inspections written quickly, and a throwaway PostgreSQL."""

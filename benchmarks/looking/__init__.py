@@ -1,1 +1,1 @@
-"""What it costs to look at the operators' pages: who looks, in which rounds, and what follows from the figures."""
+"""Cost of viewing the operators' pages: the clients, the rounds, and the results drawn from the figures."""

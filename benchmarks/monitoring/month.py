@@ -111,7 +111,7 @@ class Line:
             if number and self._now_s % (7 * DAY_S) == 3 * HOUR_S:
                 self._metrics = self._started()
             self._change()
-            self._tell()
+            self._update_metrics()
             yield self.plan.begin_s + self._now_s, self._metrics
 
     def _started(self) -> Metrics:
@@ -129,7 +129,7 @@ class Line:
             if trouble.kind != "bad lot" and 0 <= self._now_s - trouble.end_s < self.plan.step_s:
                 self._calibrated_s = self._verified_s = self._now_s
 
-    def _tell(self) -> None:
+    def _update_metrics(self) -> None:
         metrics, hour = self._metrics, self._now_s % DAY_S / HOUR_S
         for link in LINKS:
             metrics.heard(link)
@@ -221,13 +221,13 @@ class Line:
         return OutboxStatus(utc_ms=now_ms, destinations={"postgresql": told})
 
 
-def write_history(plan: Plan, folder: Path, tell: Callable[[str], None] = lambda _: None) -> set[tuple[str, str]]:
+def write_history(plan: Plan, folder: Path, report: Callable[[str], None] = lambda _: None) -> set[tuple[str, str]]:
     """Simulate, and put the samples into Prometheus' data, a day at a time.
 
     Args:
         plan: what is simulated.
         folder: of Prometheus' data.
-        tell: hears how far it is.
+        report: called with the progress after each day.
 
     Returns:
         The name and the labels of every series.
@@ -240,7 +240,7 @@ def write_history(plan: Plan, folder: Path, tell: Callable[[str], None] = lambda
             seen |= {(family, series) for (family, _), lines in samples.items() for series in lines}
             load(samples, folder)
             samples.clear()
-            tell(f"day {round((at_s - plan.begin_s) / DAY_S)} of {plan.days}")
+            report(f"day {round((at_s - plan.begin_s) / DAY_S)} of {plan.days}")
     return seen
 
 

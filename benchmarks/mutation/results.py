@@ -1,4 +1,4 @@
-"""What is known of each room's mutants, kept between runs; and those that change nothing, with the reason."""
+"""Results of each room's mutants, stored between runs; and the mutants that change nothing, with the reason."""
 
 import json
 import tomllib

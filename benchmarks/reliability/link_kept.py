@@ -1,4 +1,4 @@
-"""What is kept of every story: a line of JSON for each fruit, and one for the story's end."""
+"""Stored results of each story of disturbed links: a line of JSON for each fruit, and one for the story's end."""
 
 from collections.abc import Sequence
 from pathlib import Path

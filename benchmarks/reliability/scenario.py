@@ -1,4 +1,4 @@
-"""What is done to the station, when, and what has to come of it: the scenario files' form."""
+"""Scenario files: the fault put on the station, its moment in the cycle, and the outcome that is expected."""
 
 from enum import StrEnum
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the cycle's actions end with, by what the simulated devices and the fruit are like."""
+"""Simulated ends of the cycle's actions: the event of each, by the state of the devices and of the fruit."""
 
 from station.inspection.alarm_table import AlarmId
 from station.inspection.cycle import Event

@@ -1,4 +1,4 @@
-"""What a station on the simulated clock works on: the cell that outlives it, its limits, a trigger under way."""
+"""Surroundings of a station on the simulated clock: the cell that outlives it, its limits, a trigger under way."""
 
 import random
 from collections.abc import Callable

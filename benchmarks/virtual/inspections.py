@@ -54,9 +54,9 @@ class Inspections:
     def _deliver(self, now: Inspection) -> None:
         standing = self._records[now.sequence].standing
         if now.standing and standing is not None:
-            self._tell(standing)
+            self._send_outcome(standing)
 
-    def _tell(self, outcome: Outcome) -> None:
+    def _send_outcome(self, outcome: Outcome) -> None:
         for answer in self._waiting.pop(outcome.sequence, ()):
             answer(outcome)
 

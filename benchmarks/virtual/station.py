@@ -90,7 +90,7 @@ class Station(Actions):
             self._outcomes.add(outcome)
         if self._last is not None and self._last[1].sequence == outcome.sequence:
             self._last = None
-        self._tell(outcome)
+        self._send_outcome(outcome)
         if (running := self._running) is not None and running.sequence == outcome.sequence and self.state in UNJUDGED:
             self.post(Event.CALLED_OFF)
         return True

@@ -1,4 +1,4 @@
-"""What a calibration finds, and what it refuses."""
+"""Calibration: the figures that it finds, and the runs that it refuses."""
 
 import asyncio
 import html

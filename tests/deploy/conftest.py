@@ -1,4 +1,4 @@
-"""What the tests of the deployment share: the installer, sources of several versions, and a stand-in for systemd."""
+"""Fixtures of the deployment's tests: the installer, sources of several versions, and a stand-in for systemd."""
 
 import hashlib
 import importlib

@@ -1,4 +1,4 @@
-"""What ships: the bill of materials is of the lock, and no licence in it forbids what a packhouse does."""
+"""Bill of materials: it is that of the lock, and no licence in it forbids a packhouse's use."""
 
 import importlib.metadata
 import importlib.util

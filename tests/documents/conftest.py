@@ -56,8 +56,8 @@ class Command:
 
 
 @dataclass
-class Said:
-    """One `$` line of a console block, with what has to come back."""
+class ConsoleCommand:
+    """One `$` line of a console block, with the expected output and exit code."""
 
     line: int
     command: str
@@ -126,18 +126,18 @@ class Page:
         return found
 
     @cached_property
-    def said(self) -> list[Said]:
+    def console_commands(self) -> list[ConsoleCommand]:
         """Commands in the page's console blocks with their expected output, in order."""
-        said: list[Said] = []
+        found: list[ConsoleCommand] = []
         for token in self.tokens:
             if token.type == "fence" and token.info.startswith("console") and token.map:
                 code = int(token.info.partition("exit=")[2] or 0)
                 for number, line in enumerate(token.content.splitlines(), token.map[0] + 2):
                     if line.startswith("$ "):
-                        said.append(Said(number, line[2:], [], code))
+                        found.append(ConsoleCommand(number, line[2:], [], code))
                     else:
-                        said[-1].expected.append(line)
-        return said
+                        found[-1].expected.append(line)
+        return found
 
 
 def _words(line: str, info: str) -> list[tuple[str, ...]]:

@@ -149,7 +149,7 @@ def missing_lines(expected, output):
     missing = []
     for line in filter(None, (" ".join(line.split()) for line in expected)):
         pattern = re.compile(".*".join(map(re.escape, line.split("…"))))
-        if line != "…" and not any(pattern.fullmatch(said) for said in lines):
+        if line != "…" and not any(pattern.fullmatch(shown) for shown in lines):
             missing.append(line)
             break
     return missing
@@ -164,11 +164,11 @@ def test_what_a_document_says_a_command_answers_it_answers(name, pages, home, tm
     monkeypatch.setenv("STATION_HOME", str(home))
     monkeypatch.setenv("COLUMNS", "200")
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    for said in pages[name].said:
-        code, output = carried_out(said.command, folder, monkeypatch)
-        place = f"{name}:{said.line}: {said.command}"
-        assert code == said.code, f"{place}\n{output}"
-        assert missing_lines(said.expected, output) == [], f"{place}\n{output}"
+    for given in pages[name].console_commands:
+        code, output = carried_out(given.command, folder, monkeypatch)
+        place = f"{name}:{given.line}: {given.command}"
+        assert code == given.code, f"{place}\n{output}"
+        assert missing_lines(given.expected, output) == [], f"{place}\n{output}"
 
 
 @pytest.mark.parametrize(

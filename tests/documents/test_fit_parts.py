@@ -1,4 +1,4 @@
-"""What the constants' page says of the parts of the data is what the benchmark that writes it says."""
+"""Parts of the data on the constants' page: described in the words of the benchmark that writes it."""
 
 from pathlib import Path
 

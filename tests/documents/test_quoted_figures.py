@@ -27,7 +27,7 @@ def block(page, name):
     return found
 
 
-def said(page, pattern):
+def figures_of(page, pattern):
     """The numbers of the one sentence of a page that has this form."""
     [found] = re.findall(pattern, re.sub(r"\s+", " ", page))
     return [float(each.replace(",", "")) for each in ([found] if isinstance(found, str) else found)]
@@ -51,19 +51,21 @@ def test_the_readmes_compressed_draws_are_all_that_were_made_and_none_had_an_are
     kinds = ("JPEG 30", "JPEG 45", "JPEG 60", "video")
     assert [find(page, columns, kind, "with a false area") for kind in kinds] == ["0"] * 4
     draws = sum(int(find(page, columns, kind, "draws")) for kind in kinds)
-    assert said(text("README.md"), r"None of ([\d,]+) such draws, compressed") == [draws]
+    assert figures_of(text("README.md"), r"None of ([\d,]+) such draws, compressed") == [draws]
 
 
 def test_the_readmes_error_of_the_area_is_the_range_of_the_sound_fruit(text):
     sound = text("docs/measurement.md").partition("## The robust method on the twin")[2].partition("\n## ")[0]
     column = "error of the area: median"
     errors = [100 * float(find(sound, {column}, fruit, column)) for fruit in FRUIT]
-    low, high = said(text("README.md"), r"the area's median error is (\d+) to (\d+) % by kind")
+    low, high = figures_of(text("README.md"), r"the area's median error is (\d+) to (\d+) % by kind")
     assert (low, high) == (round(min(errors)), round(max(errors)))
 
 
 def test_calibrations_spread_is_that_of_the_units(text):
     column = "standard deviation"
-    units, spread = said(text("docs/calibration.md"), r"Over (\d+) units .*? off by ([\d.]+) %, one standard deviation")
+    units, spread = figures_of(
+        text("docs/calibration.md"), r"Over (\d+) units .*? off by ([\d.]+) %, one standard deviation"
+    )
     table = block(text("docs/sorting.md"), "calibrations")
     assert find(table, {column}, f"{units:.0f} |", column) == f"{spread}%"

@@ -184,7 +184,7 @@ def begun(command: list[str], log: Path, environment: dict[str, str]) -> Iterato
         assert not left, f"had to be killed: {left}"
 
 
-def said(log: Path, words: str, process: psutil.Process) -> bool:
+def is_logged(log: Path, words: str, process: psutil.Process) -> bool:
     assert process.is_running(), log.read_text()
     return words in log.read_text()
 
@@ -226,9 +226,9 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
     with contextlib.ExitStack() as stack:
         twin = [*station, "twin", "--config", str(file), "--bench", "--console", str(console)]
         twin_process = stack.enter_context(begun(twin, twin_log, environment))
-        eventually(lambda: said(twin_log, "running", twin_process))
+        eventually(lambda: is_logged(twin_log, "running", twin_process))
         supervisor = stack.enter_context(begun([*station, "run", "--config", str(file)], log, environment))
-        eventually(lambda: said(log, "running", supervisor), 2 * PATIENCE_S)
+        eventually(lambda: is_logged(log, "running", supervisor), 2 * PATIENCE_S)
         configuration = load_configuration(file, {})
         made = Cell(configuration, console, folder, file, supervisor, environment=environment)
         made.twin(**SLOWER_MODE)
@@ -263,7 +263,7 @@ def browser(cell: Cell, tmp_path_factory: pytest.TempPathFactory, chromium: str)
     # A connection made while the first window is still being opened once waited 30 s for it in vain.
     command = [chromium, *ARGUMENTS, "--no-startup-window", profile, f"--remote-debugging-port={port}"]
     with begun(command, log, cell.environment) as process:
-        eventually(lambda: said(log, "DevTools listening", process))
+        eventually(lambda: is_logged(log, "DevTools listening", process))
         with sync_playwright() as playwright:
             browser = connected(playwright, f"http://127.0.0.1:{port}")
             yield browser
@@ -499,7 +499,7 @@ def free_hmi(unused_port: int, tmp_path: Path) -> Iterator[Callable[..., str]]:
             command = [sys.executable, "-m", "station", "hmi", "--config", str(cell.file)]
             environment = {**cell.environment, "STATION_HMI_PORT": str(unused_port), **variables}
             process = stack.enter_context(begun(command, log, environment))
-            eventually(lambda: said(log, "the pages are served", process))
+            eventually(lambda: is_logged(log, "the pages are served", process))
             scheme = "https" if "STATION_HMI_TLS_ENABLED" in variables else "http"
             return f"{scheme}://127.0.0.1:{unused_port}"
 

@@ -1,4 +1,4 @@
-"""What happened is read by the pages' own process: also while the station is away."""
+"""History, lots, recipes and alarms of the past: read by the pages' own process, also while the station is away."""
 
 import asyncio
 import html

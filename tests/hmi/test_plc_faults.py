@@ -1,4 +1,4 @@
-"""What the PLC does wrong, beside its registers."""
+"""Handshake faults of the PLC: shown on the page of its registers."""
 
 from station.channel.panel_maintenance import Registers
 from station.messages.line import TRIGGER_NOT_RESET, WRONG_ACKNOWLEDGEMENT

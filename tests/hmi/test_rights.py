@@ -1,4 +1,4 @@
-"""Who may do what: each order and each restricted page for each role, by what docs/hmi.md promises."""
+"""Rights of each role: every order and every restricted page, as docs/hmi.md promises."""
 
 import re
 from pathlib import Path

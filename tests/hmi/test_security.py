@@ -1,4 +1,4 @@
-"""What the pages refuse, asked without a browser: forged, replayed, oversized and cross-site requests."""
+"""Security of the pages, without a browser: forged, replayed, oversized and cross-site requests are refused."""
 
 import asyncio
 import json

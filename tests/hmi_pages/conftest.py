@@ -164,15 +164,15 @@ class Site:
             assert self.order(CommandName.SET_MODE, 1).done
 
 
-def begun(command: list[str], said: Callable[[str], bool], log: Path) -> subprocess.Popen[str]:
-    """A process of the station's command line, once it has said that it runs."""
+def begun(command: list[str], is_ready: Callable[[str], bool], log: Path) -> subprocess.Popen[str]:
+    """A process of the station's command line, once one of its lines is the one that is waited for."""
     with log.open("w") as errors:
         process = subprocess.Popen(
             [sys.executable, "-m", "station", *command], stdout=subprocess.PIPE, stderr=errors, text=True
         )
     assert process.stdout is not None
     for line in process.stdout:
-        if said(line):
+        if is_ready(line):
             return process
     raise AssertionError(f"{command} ended: {log.read_text()}")
 
@@ -234,7 +234,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         people.put(name, role, PIN)
     consoles: list[int] = []
 
-    def twin_said(line: str) -> bool:
+    def twin_is_ready(line: str) -> bool:
         if line.startswith("console"):
             consoles.append(int(line.split(":")[1]))
         return line.startswith("running")
@@ -242,7 +242,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     processes: list[subprocess.Popen[str]] = []
     try:
         arguments = ["--config", str(file)]
-        processes.append(begun(["twin", "--bench", "--console", "0", *arguments], twin_said, folder / "twin.log"))
+        processes.append(begun(["twin", "--bench", "--console", "0", *arguments], twin_is_ready, folder / "twin.log"))
         processes.append(
             begun(["service", *arguments], lambda line: line.startswith("running"), folder / "service.log")
         )

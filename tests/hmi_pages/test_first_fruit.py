@@ -58,13 +58,13 @@ class Fresh:
     def begin(self, *command: str, ready: str) -> None:
         """Start a part of the station, and wait until it says that it is ready."""
 
-        def said(line: str) -> bool:
+        def is_ready(line: str) -> bool:
             if line.startswith("console"):
                 self.console = line.split(":")[1].strip()
             return ready in line
 
         log = self.folder / f"{command[0]}.log"
-        self.processes.append(begun([*command, "--config", str(self.file)], said, log))
+        self.processes.append(begun([*command, "--config", str(self.file)], is_ready, log))
 
     def serve(self, *command: str) -> None:
         """Start a part that says nothing on its standard output."""

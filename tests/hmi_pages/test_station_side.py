@@ -1,4 +1,4 @@
-"""What the station does for the pages, without a browser: jobs, the worker, shipped recipes."""
+"""Station's side of the pages, without a browser: jobs, the worker, shipped recipes."""
 
 import asyncio
 import sys

@@ -1,4 +1,4 @@
-"""What the cycle's tests share: the cell and the line as the table cannot see them."""
+"""Model of the cycle for its tests: the cell and the line beside the table's state, which the table cannot see."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -17,12 +17,12 @@ TEXT_METHODS = {
 }  # fmt: skip
 
 
-def says(node):
+def is_sentence(node):
     """Return whether an expression is a sentence of ours: a name in `SAID`, or a call on one."""
     if isinstance(node, ast.Call):
         if isinstance(node.func, ast.Name) and node.func.id == "str" and node.args:
-            return says(node.args[0])
-        return isinstance(node.func, ast.Attribute) and says(node.func.value)
+            return is_sentence(node.args[0])
+        return isinstance(node.func, ast.Attribute) and is_sentence(node.func.value)
     name = node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
     return name in SAID
 
@@ -35,13 +35,17 @@ def words(node):
 def compared(tree):
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-            pattern = isinstance(node.func.value, ast.Name) and node.func.value.id == "re" and any(map(says, node.args))
+            pattern = (
+                isinstance(node.func.value, ast.Name)
+                and node.func.value.id == "re"
+                and any(map(is_sentence, node.args))
+            )
             of_bytes = any(isinstance(each, ast.Constant) and isinstance(each.value, bytes) for each in node.args)
-            if pattern or (node.func.attr in TEXT_METHODS and says(node.func.value) and not of_bytes):
+            if pattern or (node.func.attr in TEXT_METHODS and is_sentence(node.func.value) and not of_bytes):
                 yield ast.unparse(node)
         if isinstance(node, ast.Compare):
             sides = [node.left, *node.comparators]
-            if any(map(words, sides)) and any(map(says, sides)):
+            if any(map(words, sides)) and any(map(is_sentence, sides)):
                 yield ast.unparse(node)
 
 

@@ -1,4 +1,4 @@
-"""How long the outbox's next entry has waited."""
+"""Age of the outbox's next entry: counted from the last change of its inspection or lot."""
 
 import sqlite3
 import time

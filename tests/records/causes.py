@@ -1,4 +1,4 @@
-"""What a test expects a records' error to say."""
+"""Check of the causes of a records' error, for the tests."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Which images are kept, for how long, and what is said of those that are not."""
+"""Stored images: the fruit whose images are kept, for how long, and the state of those that are not."""
 
 import asyncio
 import errno

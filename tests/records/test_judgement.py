@@ -1,4 +1,4 @@
-"""What a record keeps of a judgement: the fruit's limits, and the budget, read back as a table."""
+"""Judgement in a record: the fruit's limits and the uncertainty budget, stored, and read back as a table."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What people found of fruit: told by a command, kept with who and when, and in the audit trail."""
+"""Marks: a person's finding on a fruit, stored by a command with its author and time, and in the audit trail."""
 
 from dataclasses import replace
 

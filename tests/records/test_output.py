@@ -1,4 +1,4 @@
-"""What is handed on: the same in CSV, Parquet and a lot's report as in the records."""
+"""Outputs of the records: CSV, Parquet and a lot's report have the same content as the records."""
 
 import contextlib
 import csv

@@ -1,4 +1,4 @@
-"""Which tests are timing-bound, and what the kept rounds say."""
+"""Timing-bound tests: how they are found, and the report on the stored rounds of playing them."""
 
 from benchmarks.reliability.flaky import Round, failures, played, timing_bound
 from benchmarks.reliability.together import STATIONS

@@ -1,4 +1,4 @@
-"""What the benchmark of a fleet compares: a difference in any book is found, and the made histories are whole."""
+"""Benchmark of a fleet: a difference in any book is found, and the made histories are whole."""
 
 from dataclasses import replace
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""What the home folder keeps: the last good form of every file, whole after a crash in the middle of writing."""
+"""Files of the home folder: the last good form of each, whole after a crash in the middle of writing."""
 
 import asyncio
 import json

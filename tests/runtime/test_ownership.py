@@ -1,4 +1,4 @@
-"""What a part of the runtime lets others read, they do not write."""
+"""Ownership in the runtime: attributes that a part lets others read are written by that part alone."""
 
 import ast
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the tests of the settings share."""
+"""Fixtures of the settings' tests: the checkout, a small good recipe, and a file in the test's folder."""
 
 from collections.abc import Callable
 from pathlib import Path

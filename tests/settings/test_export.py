@@ -1,4 +1,4 @@
-"""What is made from the models is what the models say."""
+"""Exports of the settings' models: schemas, example and tables agree with the models."""
 
 import importlib
 import json

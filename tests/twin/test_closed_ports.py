@@ -40,12 +40,12 @@ def arm(host: str) -> UrController:
 
 @dataclass(frozen=True)
 class Port:
-    """A port of a device, and what it says to a client: by itself, and when asked."""
+    """A port of a device, the request to it (empty where it sends by itself), and a part of its answer."""
 
     device: Callable[[str], Any]
     number: Callable[[Any], int]
     request: bytes
-    said: bytes
+    answer: bytes
 
 
 PORTS = {
@@ -57,15 +57,15 @@ PORTS = {
 }
 
 
-async def heard(client: socket.socket, request: bytes, said: bytes) -> bytes:
-    """Send a request; return what comes back until `said` does or the connection ends: one of both within 10 s."""
+async def answer_of(client: socket.socket, request: bytes, expected: bytes) -> bytes:
+    """Send a request; return what comes back until `expected` does or the connection ends: one of both within 10 s."""
     answer = b""
     async with asyncio.timeout(10):
         with contextlib.suppress(OSError):
             client.send(request)
             while part := await asyncio.get_running_loop().sock_recv(client, 4096):
                 answer += part
-                if said in answer:
+                if expected in answer:
                     break
     return answer
 
@@ -83,18 +83,18 @@ def test_nobody_is_served_after_a_port_was_closed(port: Port, turns: int | None)
             with socket.create_connection((host, port.number(device))) as client:
                 client.setblocking(False)
                 if turns is None:
-                    return await heard(client, port.request, port.said)
+                    return await answer_of(client, port.request, port.answer)
                 for _ in range(turns):
                     await asyncio.sleep(0)
                 await device.stop()
                 with contextlib.suppress(OSError):
                     client.recv(4096)
-                return await heard(client, port.request, port.said)
+                return await answer_of(client, port.request, port.answer)
         finally:
             await device.stop()
 
     answer = asyncio.run(scenario())
-    assert port.said in answer if turns is None else answer == b""
+    assert port.answer in answer if turns is None else answer == b""
 
 
 def test_a_port_is_closed_also_where_its_closing_is_cut_short():

@@ -1,4 +1,4 @@
-"""What the arm's tests ask of it, and the pose that is far away."""
+"""Checks of the arm's state that several of its tests share, and a home pose that is far away."""
 
 import pytest
 

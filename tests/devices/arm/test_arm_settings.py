@@ -1,4 +1,4 @@
-"""What the arm's settings let pass."""
+"""Settings of the arm: the defaults, and the values that are refused."""
 
 import pytest
 from pydantic import ValidationError

@@ -1,4 +1,4 @@
-"""Whether the controller's watchdog was left without a kick: what tells its stop from one on the pendant."""
+"""Kicks of the controller's watchdog: late ones are reported, which separates its stop from one on the pendant."""
 
 import asyncio
 import time
@@ -77,7 +77,7 @@ def test_a_stop_by_the_watchdog_is_told_with_the_state_that_shows_it_also_after_
 
     controller.kickWatchdog = kick
 
-    async def told_after(share):
+    async def kicks_late_after(share):
         """Return whether kicks are late with a stop `share` of the watchdog's limit after the kick's begin."""
         controller.state, controller.kicks, controller.looks, now.s = PLAYING, 0, 0, now.s + 100.0
         assert process._prepare()
@@ -92,8 +92,8 @@ def test_a_stop_by_the_watchdog_is_told_with_the_state_that_shows_it_also_after_
         return (await process.beat(Beat(healthy_for_s=30.0))).kicks_late
 
     async def run():
-        assert await told_after(1.01)
-        assert not await told_after(0.9)
+        assert await kicks_late_after(1.01)
+        assert not await kicks_late_after(0.9)
 
     asyncio.run(run())
 

@@ -1,4 +1,4 @@
-"""What the ur-rtde process refuses, and what becomes of it, as messages; no controller is needed."""
+"""Messages of the ur-rtde process: its refusals, its silence and its end; no controller is needed."""
 
 import asyncio
 import gc

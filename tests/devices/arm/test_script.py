@@ -47,7 +47,7 @@ class Played:
         assert self.registers.output_int[0] == READY
 
     @property
-    def said(self) -> int:
+    def reply(self) -> int:
         return self.registers.output_int[0]
 
     @property
@@ -63,14 +63,14 @@ AWAY = (1.0, *HOME[1:])
 def test_a_synchronous_move_is_done_when_it_has_arrived():
     played = Played()
     played.write(1, (*AWAY, 1.0, 2.0))
-    assert played.said == READY
+    assert played.reply == READY
     played.run(1.0)
-    assert played.said == READY
+    assert played.reply == READY
     played.run(0.6)
-    assert played.said == DONE
+    assert played.reply == DONE
     assert played.body.joints_rad == pytest.approx(AWAY)
     played.run(0.1)
-    assert played.said == DONE
+    assert played.reply == DONE
     played.clear()
 
 
@@ -78,7 +78,7 @@ def test_an_asynchronous_move_is_done_at_once_and_reports_its_end():
     played = Played()
     operation, writes, _ = played.progress
     played.write(1, (*AWAY, 1.0, 2.0), integer=1)
-    assert played.said == DONE
+    assert played.reply == DONE
     assert played.progress == (operation + 1, writes + 1, True)
     played.clear()
     played.run(2.0)

@@ -1,4 +1,4 @@
-"""How often ur-rtde's threads may be woken, which is most of what its process costs."""
+"""Timer slack of ur-rtde's threads: they are woken loosely, as wake-ups are most of its process's cost."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Which motions are straight for the tool: by where the arm stands, whatever it was sent to before."""
+"""Straight motions of the tool: chosen by the arm's position, whatever pose it was sent to before."""
 
 import asyncio
 from typing import Any

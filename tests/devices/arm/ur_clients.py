@@ -1,4 +1,4 @@
-"""What other clients ask of a controller, as data.
+"""Requests of other clients to a controller, as data: RTDE recipes, and dashboard commands with their answers.
 
 Sources: Universal Robots' RTDE Python client, `examples/record_configuration.xml` (the recipe that `record.py` ships
 with); Universal Robots' C++ client library, `resources/rtde_output_recipe.txt`.

@@ -9,7 +9,7 @@ import pytest
 OnWire = Callable[..., Any]
 
 
-async def said(rig: Any, *lines: str) -> list[bytes]:
+async def exchange(rig: Any, *lines: str) -> list[bytes]:
     """Send lines on one connection, each after the answer to the one before."""
     reader, writer = await asyncio.open_connection(rig.server.host, rig.server.port)
     answers = []
@@ -21,9 +21,9 @@ async def said(rig: Any, *lines: str) -> list[bytes]:
     return answers
 
 
-async def until_said(rig: Any, line: str, reply: bytes) -> None:
-    """Ask on a new connection each time until an answer comes; the scenario's own limit is the deadline."""
-    while (await said(rig, line)) != [reply]:
+async def until_replied(rig: Any, line: str, reply: bytes) -> None:
+    """Send it on a new connection each time until an answer comes; the scenario's own limit is the deadline."""
+    while (await exchange(rig, line)) != [reply]:
         pass
 
 
@@ -47,30 +47,30 @@ async def until_said(rig: Any, line: str, reply: bytes) -> None:
 )
 def test_each_line_gets_its_answer(on: OnWire, line: str, reply: bytes):
     async def scenario(rig: Any) -> list[bytes]:
-        return await said(rig, line)
+        return await exchange(rig, line)
 
     assert on("urcap", scenario) == [reply]
 
 
 def test_a_client_with_a_connection_for_each_command_grips(on: OnWire):
     async def scenario(rig: Any) -> None:
-        assert await said(rig, "SET POS 40 SPE 255 FOR 255 GTO 1\n") == [b"ack"]
-        assert await said(rig, "GET PRE\n") == [b"PRE 40\n"]
-        await until_said(rig, "GET OBJ\n", b"OBJ 3\n")
-        assert await said(rig, "GET POS\n") == [b"POS 40\n"]
+        assert await exchange(rig, "SET POS 40 SPE 255 FOR 255 GTO 1\n") == [b"ack"]
+        assert await exchange(rig, "GET PRE\n") == [b"PRE 40\n"]
+        await until_replied(rig, "GET OBJ\n", b"OBJ 3\n")
+        assert await exchange(rig, "GET POS\n") == [b"POS 40\n"]
 
     on("urcap", scenario)
 
 
 def test_the_object_state_is_0_when_the_acknowledgement_comes(on: OnWire):
     async def scenario(rig: Any) -> None:
-        await said(rig, "SET POS 3 GTO 1\n")
-        await until_said(rig, "GET OBJ\n", b"OBJ 3\n")
+        await exchange(rig, "SET POS 3 GTO 1\n")
+        await until_replied(rig, "GET OBJ\n", b"OBJ 3\n")
         rig.clock.hold()  # on a busy machine the fingers may arrive between the two lines
         for position in range(100, 110):
-            assert await said(rig, f"SET POS {position} SPE 0 GTO 1\n", "GET OBJ\n") == [b"ack", b"OBJ 0\n"]
+            assert await exchange(rig, f"SET POS {position} SPE 0 GTO 1\n", "GET OBJ\n") == [b"ack", b"OBJ 0\n"]
             rig.clock.skip(10.0)
-            assert await said(rig, "GET OBJ\n") == [b"OBJ 3\n"]
+            assert await exchange(rig, "GET OBJ\n") == [b"OBJ 3\n"]
 
     on("urcap", scenario)
 
@@ -78,12 +78,12 @@ def test_the_object_state_is_0_when_the_acknowledgement_comes(on: OnWire):
 def test_two_clients_see_one_gripper(on: OnWire):
     async def scenario(rig: Any) -> None:
         first, second = await asyncio.gather(
-            said(rig, "SET POS 77\n", "GET PRE\n"),
-            said(rig, *["GET STA\n"] * 20),
+            exchange(rig, "SET POS 77\n", "GET PRE\n"),
+            exchange(rig, *["GET STA\n"] * 20),
         )
         assert first == [b"ack", b"PRE 77\n"]
         assert second == [b"STA 3\n"] * 20
-        assert await said(rig, "GET PRE\n") == [b"PRE 77\n"]
+        assert await exchange(rig, "GET PRE\n") == [b"PRE 77\n"]
 
     on("urcap", scenario)
 
@@ -91,7 +91,7 @@ def test_two_clients_see_one_gripper(on: OnWire):
 def test_an_emergency_stop_is_a_question_mark(on: OnWire):
     async def scenario(rig: Any) -> list[bytes]:
         rig.faults.set("emergency_stopped")
-        return await said(rig, "GET POS\n", "GET STA\n")
+        return await exchange(rig, "GET POS\n", "GET STA\n")
 
     assert on("urcap", scenario) == [b"POS ?\n", b"STA ?\n"]
 

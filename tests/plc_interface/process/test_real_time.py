@@ -1,4 +1,4 @@
-"""What the process asks of the machine, tried in a process of its own."""
+"""Real-time priority of the process: granted or refused with the remedy, tried in a process of its own."""
 
 import subprocess
 import sys

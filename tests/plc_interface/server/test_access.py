@@ -1,4 +1,4 @@
-"""Who may connect, read and write."""
+"""Access to the Modbus server: addresses that may connect and read, and those that may write."""
 
 import pytest
 

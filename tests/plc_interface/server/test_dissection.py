@@ -1,4 +1,4 @@
-"""What the server sends, read by a dissector that others wrote."""
+"""Responses of the Modbus server: read by a dissector that others wrote, which finds nothing malformed."""
 
 import random
 import struct

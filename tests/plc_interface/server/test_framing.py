@@ -1,4 +1,4 @@
-"""Where one message ends and the next begins, however TCP cuts them."""
+"""Framing of Modbus ADUs: the end of one and the begin of the next are found, however TCP cuts them."""
 
 import struct
 

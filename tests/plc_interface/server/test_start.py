@@ -1,4 +1,4 @@
-"""What keeps the server from starting is one sentence with the remedy."""
+"""Failed starts of the Modbus server: each cause is one sentence with the remedy."""
 
 import socket
 

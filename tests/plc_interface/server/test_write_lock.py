@@ -1,4 +1,4 @@
-"""Who may write, and when that ends."""
+"""Write lock of the Modbus server: one client owns it, until it disconnects, gives it back or stops writing."""
 
 import struct
 

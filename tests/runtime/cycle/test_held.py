@@ -1,4 +1,4 @@
-"""What only a person may end is found again by the next start, at whatever step the station was killed."""
+"""Holds that only a person may end: found again by the next start, at whatever step the station was killed."""
 
 import asyncio
 import subprocess

@@ -1,4 +1,4 @@
-"""What a site may choose: fruit placed by the arm, no reset by itself; and a disk that refuses in mid inspection."""
+"""Options of a site: fruit placed by the arm, no reset by itself; and a disk that refuses in mid inspection."""
 
 import asyncio
 import resource

@@ -1,4 +1,4 @@
-"""What a calibration at the panel may move: nothing from the moment at which the cycle is stopped on."""
+"""Motions of a calibration at the panel: once the cycle is stopped, none but of jaws that may open."""
 
 import asyncio
 import time

@@ -1,4 +1,4 @@
-"""What a device's monitor reports: each change that means something else to the cycle, once."""
+"""Device monitor: reports each change that means something else to the cycle, once."""
 
 import asyncio
 from types import SimpleNamespace

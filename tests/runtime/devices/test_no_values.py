@@ -1,4 +1,4 @@
-"""What a gripper without values behind its URCap is: an emergency stop only where the arm reports one."""
+"""Gripper without values behind its URCap: an emergency stop only if its arm reports one or there is no arm."""
 
 import asyncio
 from dataclasses import dataclass

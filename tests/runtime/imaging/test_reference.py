@@ -1,4 +1,4 @@
-"""What is wrong with a reference is named alike, however the light has drifted since the golden one."""
+"""Faults of a reference: each has the same alarm, however the light has drifted since the golden one."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What-if measures the images that a station has really stored, where a draft's segmentation is another one."""
+"""Images that a station has really stored: the what-if measures them again for a draft with another segmentation."""
 
 import asyncio
 import json

@@ -1,4 +1,4 @@
-"""What is scraped: named by the conventions, bounded, and equal to the records."""
+"""Metrics as scraped: named by the conventions, bounded, and equal to the records."""
 
 import time
 from collections import Counter

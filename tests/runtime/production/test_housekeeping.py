@@ -1,4 +1,4 @@
-"""What is done beside the cycle, and when."""
+"""Housekeeping beside the cycle: done between inspections; a slow recovery and steps of the clock are handled."""
 
 import asyncio
 import time

@@ -1,4 +1,4 @@
-"""What the PLC interface asks beside a fruit's outcome: doubled triggers, refusals, commands, the state."""
+"""Requests of the PLC interface beside a fruit's outcome: doubled triggers, refusals, commands, the state."""
 
 import asyncio
 import json

@@ -1,4 +1,4 @@
-"""What the station finds of the pages' process."""
+"""Fault of the pages' process: reported by the station once pages that were heard are silent."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""What a site may set, and what it is told where that does not fit."""
+"""Settings of the CAN outputs: values that do not fit are refused with the reason; the driver is off by default."""
 
 import re
 

@@ -18,7 +18,7 @@ from plc_interface.outputs.can.pending_rejects import Order, PendingRejects, Rep
 from station.messages import can as messages
 
 
-def says(definition):
+def has_message(definition):
     """Return a check that an error's message, or one that it encloses, is of this definition."""
     return lambda error: definition.id in error.message.ids()
 
@@ -63,7 +63,7 @@ def test_a_count_that_is_past_is_refused_and_nothing_is_sent(on_bus):
     async def scenario(rig):
         await rig.ready()
         count = rig.io.encoder_count()
-        with pytest.raises(LateRejectError, check=says(messages.COUNT_PAST)) as raised:
+        with pytest.raises(LateRejectError, check=has_message(messages.COUNT_PAST)) as raised:
             await rig.io.divert(9, 1, count)
         assert raised.value.sequence == 9
         assert "shots_ordered" not in rig.io.counters
@@ -104,7 +104,7 @@ def test_the_ninth_order_finds_no_place(on_bus):
         await rig.ready()
         shots = [await rig.order(sequence, 500 + sequence) for sequence in range(1, 9)]
         ninth = await rig.order(9, 600)
-        with pytest.raises(RejectRefusedError, check=says(messages.GATE_FULL)):
+        with pytest.raises(RejectRefusedError, check=has_message(messages.GATE_FULL)):
             await ninth
         rig.run_belt()
         assert [(await shot).sequence for shot in shots] == list(range(1, 9))
@@ -116,13 +116,13 @@ def test_a_missing_echo_is_a_fault_with_the_sequence(on_bus):
     async def scenario(rig):
         await rig.ready()
         rig.faults.set("no_echo")
-        with pytest.raises(EchoMissingError, check=says(messages.NOT_CONFIRMED)):
+        with pytest.raises(EchoMissingError, check=has_message(messages.NOT_CONFIRMED)):
             await (await rig.order(7, 400))
         rig.faults.clear("no_echo")
         shot = await rig.order(8, 400)
         rig.faults.set("no_echo")
         rig.run_belt()
-        with pytest.raises(EchoMissingError, check=says(messages.NOT_REPORTED)):
+        with pytest.raises(EchoMissingError, check=has_message(messages.NOT_REPORTED)):
             await shot
         assert rig.io.counters["echoes_missing"] == 2
         assert [fault.parameters["sequence"] for fault in rig.io.reject_faults] == [7, 8]
@@ -134,7 +134,7 @@ def test_an_echo_under_another_sequence_is_no_echo(on_bus):
     async def scenario(rig):
         await rig.ready()
         rig.faults.set("wrong")
-        with pytest.raises(EchoMissingError, check=says(messages.SHOT)):
+        with pytest.raises(EchoMissingError, check=has_message(messages.SHOT)):
             await (await rig.order(20, 400))
         assert rig.io.reject_faults[0] == messages.UNORDERED_REPORT(sequence=21)
         assert rig.io.counters["echoes_unknown"] == 1
@@ -161,7 +161,7 @@ def test_a_shot_at_another_count_is_a_wrong_echo(on_bus):
         rig.faults.set("misplaced", 1000)
         shot = await rig.order(3, 400)
         rig.run_belt()
-        with pytest.raises(EchoWrongError, check=says(messages.FIRED_LATE)):
+        with pytest.raises(EchoWrongError, check=has_message(messages.FIRED_LATE)):
             await shot
 
     on_bus(scenario, tolerance_counts=500, echo_deadline_s=5.0)
@@ -171,7 +171,7 @@ def test_a_belt_that_does_not_come_ends_the_wait(on_bus):
     async def scenario(rig):
         await rig.ready()
         shot = await rig.order(4, 400)
-        with pytest.raises(EchoMissingError, check=says(messages.BELT_SLOW)):
+        with pytest.raises(EchoMissingError, check=has_message(messages.BELT_SLOW)):
             await shot
 
     on_bus(scenario, shot_deadline_s=0.5)
@@ -180,7 +180,7 @@ def test_a_belt_that_does_not_come_ends_the_wait(on_bus):
 @pytest.mark.parametrize(("sequence", "lane", "count"), [(0, 1, 5), (2**32, 1, 5), (1, 0, 5), (1, 9, 5), (1, 1, 2**32)])
 def test_an_order_beyond_its_bounds_is_refused(on_bus, sequence, lane, count):
     async def scenario(rig):
-        with pytest.raises(RejectRefusedError, check=says(messages.ORDER_MALFORMED)):
+        with pytest.raises(RejectRefusedError, check=has_message(messages.ORDER_MALFORMED)):
             await rig.io.divert(sequence, lane, count)
 
     on_bus(scenario, start=False)
@@ -188,11 +188,11 @@ def test_an_order_beyond_its_bounds_is_refused(on_bus, sequence, lane, count):
 
 def test_no_order_without_a_bus_and_no_sequence_twice(on_bus):
     async def scenario(rig):
-        with pytest.raises(NotReadyError, check=says(messages.UNHEALTHY)):
+        with pytest.raises(NotReadyError, check=has_message(messages.UNHEALTHY)):
             await rig.io.divert(1, 1, 5000)
         await rig.ready()
         first = await rig.order(65_537, 400)
-        with pytest.raises(RejectRefusedError, check=says(messages.ORDERED_TWICE)):
+        with pytest.raises(RejectRefusedError, check=has_message(messages.ORDERED_TWICE)):
             await rig.io.divert(1, 1, (rig.nodes.encoder.count + 500) % 2**32)
         rig.run_belt()
         assert (await first).sequence == 65_537
@@ -205,7 +205,7 @@ def test_a_gate_lost_under_way_ends_the_shot(on_bus):
         await rig.ready()
         shot = await rig.order(6, 400)
         rig.faults.set("gate_silent")
-        with pytest.raises(RejectLostError, check=says(messages.SILENT)):
+        with pytest.raises(RejectLostError, check=has_message(messages.SILENT)):
             await shot
         assert not rig.nodes.gate.fired
 
@@ -222,7 +222,7 @@ def test_the_gates_late_answer_is_a_late_shot():
                 shots.on_report(Report(4, 2, 510))
                 await shot.next()
 
-        with pytest.raises(LateRejectError, check=says(messages.ORDER_LATE)):
+        with pytest.raises(LateRejectError, check=has_message(messages.ORDER_LATE)):
             await ordered()
         assert counters["shots_failed"] == 1
 

@@ -1,4 +1,4 @@
-"""What fails, and what then holds: a safe output, a sentence, a count, and the way back."""
+"""Failures on the CAN: each leads to a safe output, a sentence, a count, and a way back."""
 
 import asyncio
 import struct
@@ -13,7 +13,7 @@ from station.messages import can as messages
 UP = messages.COMING_UP()
 
 
-def says(definition):
+def has_message(definition):
     """Return a check that an error's message, or one that it encloses, is of this definition."""
     return lambda error: definition.id in error.message.ids()
 
@@ -27,7 +27,7 @@ def test_without_the_stations_heartbeat_the_gate_is_safe_alone_and_remembers(on_
         shot = await rig.order(1, 400)
         assert gate.output == 0
         rig.io.renew_health(0)
-        with pytest.raises(RejectLostError, check=says(messages.UNHEALTHY)):
+        with pytest.raises(RejectLostError, check=has_message(messages.UNHEALTHY)):
             await shot
         await rig.until(lambda: gate.output == 0b101)
         assert not gate.operational
@@ -85,7 +85,7 @@ def test_a_lost_node_is_named_and_found_again(on_bus, fault, name):
         await rig.ready()
         rig.faults.set(fault)
         await rig.until(lambda: rig.io.why_not_ready == messages.SILENT(node=name))
-        with pytest.raises(NotReadyError, check=says(messages.SILENT)):
+        with pytest.raises(NotReadyError, check=has_message(messages.SILENT)):
             await rig.io.divert(1, 1, 5000)
         rig.faults.clear()
         await rig.until(lambda: rig.io.ready)
@@ -181,13 +181,13 @@ def test_a_bus_that_stays_off_is_said(on_bus):
         wire = rig.wire()
         off = can.Message(arbitration_id=0x40, is_error_frame=True, is_extended_id=False, dlc=8)
 
-        def said():
+        def bus_off_reported():
             # At each look, as the bus may have been brought up between one frame and the next.
             wire.send(off)
             return not rig.io.ready and messages.BUS_OFF.id in {fault.id for fault in rig.io.bus_faults}
 
         try:
-            await rig.until(lambda: said() and rig.io.counters["bus_off"] >= 3)
+            await rig.until(lambda: bus_off_reported() and rig.io.counters["bus_off"] >= 3)
         finally:
             wire.shutdown()
         await rig.until(lambda: rig.io.ready)
