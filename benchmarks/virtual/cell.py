@@ -45,7 +45,6 @@ class Cell:
 class Pending:
     """A trigger between its request and its answer."""
 
-    request: tuple[int, int]
     record: Record
     answer: Callable[[BeginReply], None]
     now: Inspection

@@ -20,7 +20,6 @@ class Inspections:
         self._pending: Pending | None = None
         self._now: Inspection | None = None
         self._begun: list[Inspection] = []
-        self._last: tuple[tuple[int, int], Inspection] | None = None
         self._waiting: dict[int, list[Callable[[Outcome], None]]] = {}
 
     @property
@@ -64,12 +63,8 @@ class Inspections:
         pending.now.accepted_s = self._clock.s
         self._begun = [now for now in self._begun if not now.standing]
         self._begun.append(pending.now)
-        self._last = pending.request, pending.now
-        pending.answer(self._accepted(pending.now))
-
-    @staticmethod
-    def _accepted(now: Inspection) -> BeginReply:
-        return BeginReply(sequence=now.sequence, deadline_s=LIMITS.inspection_s + RECORD_NO_RESULT_S)
+        deadline_s = LIMITS.inspection_s + RECORD_NO_RESULT_S
+        pending.answer(BeginReply(sequence=pending.now.sequence, deadline_s=deadline_s))
 
     def _utc_ms(self) -> int:
         return round(1000 * self._clock.time())

@@ -105,7 +105,9 @@ class Interface:
         self._machine.journal = journal  # on a full disk too: it has a reserve
         if journal.highest != self._highest:
             self._highest = journal.highest
-            self._machine.laws.accepted(journal.highest)
+            waiting = {each.sequence for each in (*journal.queue, journal.running) if each is not None}
+            if journal.highest in waiting:  # else it is of a refused trigger, which uses up a sequence too
+                self._machine.laws.accepted(journal.highest)
 
     def _publish(self) -> None:
         for name, value in view(self._state).items():

@@ -59,15 +59,12 @@ class Station(Actions):
         )
 
     def begin(self, trigger_id: int, encoder: int, lot: str, answer: Callable[[BeginReply], None]) -> None:
-        """Begin an inspection or refuse it; the same request again begins none."""
-        request = trigger_id, encoder
-        if self._last is not None and self._last[0] == request:
-            answer(self._accepted(self._last[1]))
-        elif (refusal := STATES[self.state].refusal) is not None or self._pending is not None:
+        """Begin an inspection or refuse it; an equal request is another fruit's."""
+        if (refusal := STATES[self.state].refusal) is not None or self._pending is not None:
             answer(BeginReply(refusal=refusal or Refusal.BUSY))
         else:
             record = Record(trigger_id, encoder, lot, _NUMBER, self._utc_ms())
-            self._pending = Pending(request, record, answer, Inspection())
+            self._pending = Pending(record, answer, Inspection())
             self.post(Event.TRIGGER)
 
     def await_outcome(self, sequence: int, answer: Callable[[Outcome], None]) -> bool:
@@ -88,8 +85,6 @@ class Station(Actions):
             return False
         if self._records.publish(outcome):
             self._outcomes.add(outcome)
-        if self._last is not None and self._last[1].sequence == outcome.sequence:
-            self._last = None
         self._send_outcome(outcome)
         if (running := self._running) is not None and running.sequence == outcome.sequence and self.state in UNJUDGED:
             self.post(Event.CALLED_OFF)

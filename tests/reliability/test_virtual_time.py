@@ -60,6 +60,7 @@ def test_laws_hold_over_a_thousand_triggers():
             [("disk", "full", 77.789, 8.463), ("station", "kill", 82.519, 1.353), ("interface", "kill", 83.795, 0.391)],
         ),
         (5467, 49, False, [("channel", "intermittent", 91.248, 1.446), ("channel", "delayed", 93.068, 1.72)]),
+        (170, 1, True, [("interface", "kill", 1.352, 1.169)]),
     ],
     ids=[
         "a connection cut and made again within a scan arms again",
@@ -67,6 +68,7 @@ def test_laws_hold_over_a_thousand_triggers():
         "an area beyond the last limit's closing is not held against it",
         "an outcome of the interface's own that a full disk kept from the journal is not made anew",
         "a trigger that arrives after the interface has given it up begins nothing",
+        "what was begun by a trigger whose answer was lost is no accepted fruit",
     ],
 )
 def test_a_story_that_broke_a_law_holds_them_now(seed, fruits, carries, troubles):
