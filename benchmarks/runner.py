@@ -86,6 +86,9 @@ def run(names: Sequence[str], options: Sequence[str] = ()) -> int:
 
 def main(arguments: Sequence[str]) -> int:
     """Run what was asked for, or list what there is."""
+    # As `station/__init__.py` has it for every process of the station: a benchmark may import numpy before, and two
+    # processes whose matrix products have two threads each on two cores wait for each other most of their time.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if list(arguments) == ["--list"]:
         print(listing(summary.read_runs()))
         return 0
