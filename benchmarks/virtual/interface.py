@@ -58,7 +58,7 @@ class Interface:
         self._notes: deque[do.NotifyPublished | do.NotifyAcknowledged] = deque()
         self._timer: Timer | None = None
         self._due_s: float | None = None
-        self._highest = machine.journal.highest
+        self._before = machine.journal
         self._save(self._state.journal)
         self._publish()
         self._wake_when_due()
@@ -103,11 +103,17 @@ class Interface:
 
     def _save(self, journal: Journal) -> None:
         self._machine.journal = journal  # on a full disk too: it has a reserve
-        if journal.highest != self._highest:
-            self._highest = journal.highest
-            waiting = {each.sequence for each in (*journal.queue, journal.running) if each is not None}
-            if journal.highest in waiting:  # else it is of a refused trigger, which uses up a sequence too
-                self._machine.laws.accepted(journal.highest)
+        before, self._before = self._before, journal
+        if journal.highest == before.highest:
+            return
+        # A refused trigger's inspection uses up a sequence too. It never runs for the PLC or waits for it, and its id
+        # is not stored as accepted. An accepted one that is lost at once has its id stored all the same.
+        waiting = {each.sequence for each in (*journal.queue, journal.running) if each is not None}
+        accepted = {sequence for sequence in waiting if sequence > before.highest}
+        if not accepted and journal.accepted_id != before.accepted_id:
+            accepted = {journal.highest}
+        for sequence in accepted:
+            self._machine.laws.accepted(sequence)
 
     def _publish(self) -> None:
         for name, value in view(self._state).items():

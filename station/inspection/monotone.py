@@ -83,20 +83,20 @@ def _narrower_than_before(widths_mm: Sequence[float]) -> list[int]:
 
 
 def _longest_run(values: npt.NDArray[np.float64], floors: npt.NDArray[np.float64]) -> list[int]:
-    """Places of the longest run in which no value falls below the floor of one before it, the last one first.
+    """Places of the longest run in which no value falls below the floor of one before it, in no order.
 
     Dynamic programming over the run's last place and its length, in quadratic time and memory where any value falls: of
     all runs of one length the one with the lowest highest floor is continued by whatever continues another.
     """
     if (values[1:] >= np.maximum.accumulate(floors)[:-1]).all():
-        return list(range(values.size))[::-1]
+        return list(range(values.size))
     lowest = np.full(values.size + 1, np.inf)  # the lowest highest floor of the runs so far, by their length
     lowest[0] = -np.inf
     ending = np.full((values.size, values.size + 1), np.inf)  # likewise of those that end at a place
     for place, value in enumerate(values):
         ending[place, 1:] = np.where(value >= lowest[:-1], np.maximum(lowest[:-1], floors[place]), np.inf)
         lowest = np.minimum(lowest, ending[place])
-    run, end, least_after = list[int](), values.size, values.max(initial=0.0)
+    run, end, least_after = list[int](), values.size, values.max()
     for length in range(int(np.flatnonzero(lowest < np.inf)[-1]), 0, -1):
         fitting = np.flatnonzero(ending[:end, length] <= least_after)
         end = int(fitting[0] if run else fitting[-1])

@@ -80,6 +80,15 @@ def test_a_run_with_options_is_none_of_the_whole(benches):
     assert not summary.RUNS.exists()
 
 
+def test_a_benchmark_has_one_thread_for_matrix_products_however_it_is_begun(benches, tmp_path, monkeypatch):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    page = tmp_path / "threads"
+    source = f'"""Threads."""\nimport os\nopen({str(page)!r}, "w").write(os.environ["OPENBLAS_NUM_THREADS"])\n'
+    (tmp_path / "bench_one.py").write_text(source)
+    assert runner.main(["one"]) == 0
+    assert page.read_text() == "1"
+
+
 def test_the_list_says_how_long_each_took(benches, capsys):
     (benches.parent / "bench_endless.py").write_text('"""What never ends."""\n')
     assert runner.main(["three", "one"]) == 0

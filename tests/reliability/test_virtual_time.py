@@ -3,14 +3,16 @@
 import logging
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from benchmarks.virtual import actions, interface, laws
 from benchmarks.virtual.play import play
 from benchmarks.virtual.story import Story, Trouble, draw, shrink
-from plc_interface.handshake import inputs
-from plc_interface.handshake.journal import Journal
+from plc_interface.handshake import inputs, inspection
+from plc_interface.handshake.actions import RequestBegin
+from plc_interface.handshake.journal import Journal, Running
 from plc_interface.plc_simulator.program import LineProgram
 from station.inspection.cycle import TABLE, UNJUDGED, Action, Event, Transition
 from station.inspection.judge import Judgement
@@ -107,6 +109,16 @@ def test_a_motion_that_no_stop_halts_is_found(monkeypatch: pytest.MonkeyPatch):
     least = found(laws.NOTHING_MOVES)
     assert len(least.troubles) <= 2
     assert "arm protective_stop" in {trouble.name for trouble in least.troubles}
+
+
+def test_an_accepted_trigger_that_is_forgotten_at_once_is_found(monkeypatch: pytest.MonkeyPatch):
+    real = inspection.running
+
+    def forgetful(pending: RequestBegin, sequence: int, *rest: Any) -> Running | None:
+        return None if sequence == 3 else real(pending, sequence, *rest)
+
+    monkeypatch.setattr(inspection, "running", forgetful)
+    assert len(found(laws.ONE_OUTCOME).troubles) <= 1
 
 
 def test_an_outcome_that_is_shown_again_is_found(monkeypatch: pytest.MonkeyPatch):
