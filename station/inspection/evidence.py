@@ -167,12 +167,12 @@ class Evidence:
     @cached_property
     def growths(self) -> list[Growth]:
         """The growth over every run of judged steps; over all of them where they are too few for a run."""
-        return [self._growth(window) for window in _windows(self.judged)]
+        return [self._growth(window) for window in self._windows(self.judged)]
 
     @property
     def latest_growth(self) -> Growth | None:
         """The growth over the last steps, light touches too; None before there are enough."""
-        windows = _windows([point for point in self.points if point.closing_mm >= 0])
+        windows = self._windows([point for point in self.points if point.closing_mm >= 0])
         return self._growth(windows[-1]) if windows and len(windows[-1]) >= _WINDOW_POINTS else None
 
     @property
@@ -187,6 +187,21 @@ class Evidence:
             beyond = [point for point in self.judged if point not in self.needed and self.bounds(point)]
             begins.append(_begins_at_mm([*(point for point in self.needed if self.bounds(point)), *beyond[:1]]))
         return None if None in begins else max(begin for begin in begins if begin is not None)
+
+    def _windows(self, points: Sequence[Measured]) -> list[Sequence[Measured]]:
+        """Runs of at least four points and two millimetres; all of fewer points where they are no two of one width."""
+        windows: list[Sequence[Measured]] = []
+        for end in range(len(points), 0, -1):
+            start = end - _WINDOW_POINTS
+            while start > 0 and points[end - 1].closing_mm - points[start].closing_mm < _WINDOW_MM:
+                start -= 1
+            if start < 0:
+                break
+            windows.append(points[start:end])
+        # Images on the way are taken between two counts of the gripper: those of one count may be as far from each
+        # other as it, and an area over the way that they seem to have is any growth.
+        apart = len(points) > 1 and points[-1].closing_mm - points[0].closing_mm > self._press.resolution_mm / 2
+        return windows[::-1] or ([points] if apart else [])
 
     def _step_uncertainty_mm2(self, point: Measured) -> float:
         """Of a point's area against its neighbours'; what they share shifts them alike."""
@@ -258,19 +273,6 @@ def _between(points: Sequence[Measured], closing_mm: float) -> tuple[float, floa
             area = before.area_mm2 + share * (after.area_mm2 - before.area_mm2)
             return area, max(before.area_scatter_mm2, after.area_scatter_mm2)
     return None
-
-
-def _windows(points: Sequence[Measured]) -> list[Sequence[Measured]]:
-    """Runs of at least four points and two millimetres; all of fewer points where there are two."""
-    windows: list[Sequence[Measured]] = []
-    for end in range(len(points), 0, -1):
-        start = end - _WINDOW_POINTS
-        while start > 0 and points[end - 1].closing_mm - points[start].closing_mm < _WINDOW_MM:
-            start -= 1
-        if start < 0:
-            break
-        windows.append(points[start:end])
-    return windows[::-1] or ([points] if len(points) > 1 else [])
 
 
 def _slopes(points: Sequence[Measured]) -> list[float]:

@@ -90,6 +90,17 @@ def test_a_full_field_after_the_last_threshold_spares_a_sound_fruit_and_passes_i
     assert verdict.areas[-1].area_mm2 is None
 
 
+def test_two_images_of_one_count_of_the_gripper_prove_no_growth():
+    values = BLUEBERRY.model_dump(mode="json")
+    values["damage"]["uncertainty"]["coverage"] = 0.6  # hardly a guard band
+    recipe = Recipe.model_validate_json(json.dumps(values))
+    press = Press(16.0, 0.4, (point(4.20, 42.0), point(4.24, 46.0)), resolution_mm=0.374)
+    assert judge(press, recipe).growth is None
+    far = judge(replace(press, points=(point(4.20, 42.0), point(4.60, 58.0))), recipe)
+    assert far.growth
+    assert Reason.GROWTH_OVER_LIMIT in far.reasons, "a count further it is evidence"
+
+
 def test_a_soft_fruit_fails_with_value_limit_and_closing():
     verdict = judge(pressed(48), STRAWBERRY)
     assert verdict.outcome == "FAIL"

@@ -84,7 +84,7 @@ def test_the_last_mode_is_what_the_file_has_also_where_the_disk_outlasts_the_ord
     begun, free, ended, write = threading.Event(), threading.Event(), threading.Event(), StateFiles.write
 
     def slow_once(self, name, data):
-        if begun.is_set():
+        if name != "mode" or begun.is_set():
             return write(self, name, data)
         begun.set()
         assert free.wait(60)
