@@ -20,7 +20,7 @@ def write_atomically(
     owner: tuple[int, int] | None = None,
     durable: bool = True,
 ) -> None:
-    """Replace a file as a whole: a reader, or whoever comes after a kill or a loss of power, finds the old or the new.
+    """Replace a file as a whole: a reader finds the old one or the new one, also after a kill or a loss of power.
 
     Args:
         path: in an existing folder.

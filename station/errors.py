@@ -6,7 +6,7 @@ from station.messages.message import Message, verbatim
 
 
 class StationError(Exception):
-    """A failure with a message: what is wrong, what it means, what to do; words instead are read in English everywhere.
+    """A failure with a message: what is wrong, what it means, what to do. A text in its place is English everywhere.
 
     The command line shows the message alone and ends with exit code 1.
     """
@@ -20,8 +20,8 @@ class StationError(Exception):
     def again(self) -> Self:
         """Return this stored error without its traceback, to be raised again.
 
-        Python adds to an error's traceback, with all that its functions held, each time it is raised: one that is kept
-        for as long as a device waits for a person would grow by megabytes an hour.
+        Python adds to an error's traceback, with all that its functions held, each time it is raised: one that is
+        stored while a device waits for a person would grow by megabytes an hour.
         """
         return self.with_traceback(None)
 

@@ -54,7 +54,7 @@ class Flag(StrEnum):
     SATURATED = "saturated"
     """Much of the contact is at the end of the grey scale: its edge may lie elsewhere."""
     LOW_CONFIDENCE = "low_confidence"
-    """The confidence is below what the recipe asks for."""
+    """The confidence is below what the recipe requires."""
     REFERENCE_MISMATCH = "reference_mismatch"
     """The frame differs from its reference by more than contact and drift explain: take a new reference."""
 

@@ -135,7 +135,7 @@ def _make_environment(venv: Path, source: Path, packages: Packages) -> None:
 
 
 def _open_to_all(release: Path) -> None:
-    """Let the station's user read root's files, whatever root's umask is."""
+    """Make root's files readable for the station's user, independent of root's umask."""
     for path in (release, *release.rglob("*")):
         if not path.is_symlink():
             mode = path.stat().st_mode & 0o7777

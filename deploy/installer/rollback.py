@@ -86,7 +86,7 @@ def _restores(layout: Layout, copy: Path) -> bool:
 
 
 def _schema(records: Path) -> str | None:
-    """Return the schema of the records in use; None where nobody can read them as they are."""
+    """Return the schema of the records in use; None where they cannot be read as they are."""
     try:
         return backup.schema_version(records)
     except sqlite3.Error:

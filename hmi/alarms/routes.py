@@ -80,7 +80,7 @@ async def one_part(request: Request, hmi: HmiNow, locale: LocaleNow, alarm: Alar
 
 @router.post("/alarms/{alarm}/acknowledge")
 async def acknowledge(hmi: HmiNow, caller: Operator, alarm: AlarmName, since: Annotated[int, Form(ge=0)]) -> Response:
-    """Acknowledge an alarm, if it is still the one that became active then: what came later nobody has read."""
+    """Acknowledge an alarm if it is still the one that became active at `since`; a later one has not been read yet."""
     present = _listed(hmi, alarm)
     if present is not None and present.since_utc_ms != since:
         raise Problem(409, "alarms.raised_again")

@@ -1,4 +1,4 @@
-"""The file `station.yaml` as text: read, replaced with the former one kept, and compared by its settings."""
+"""The file `station.yaml` as text: reading, replacement with a copy of the former one, comparison by its settings."""
 
 import hashlib
 from collections.abc import Iterator, Mapping
@@ -12,7 +12,7 @@ from station.settings.yaml_loader import parse_document
 
 
 def former(file: Path) -> Path:
-    """Return where the former file is kept: beside the file that a link leads to."""
+    """Return the path of the former file: beside the file that a link leads to."""
     file = file.resolve()
     return file.with_name(f"{file.name}.former")
 

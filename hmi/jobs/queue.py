@@ -227,7 +227,7 @@ class Jobs:
 
 
 async def _ended(process: asyncio.subprocess.Process) -> None:
-    """Kill the process and all that it started, whatever happens."""
+    """Kill the process and all that it started, in any case."""
     if process.returncode is None:
         with contextlib.suppress(ProcessLookupError):
             process.terminate()

@@ -53,7 +53,7 @@ class PastCurve(NamedTuple):
     """One fruit's curve."""
 
     outcome: str
-    """The judge's, whatever became of the fruit afterwards: it is compared with limits."""
+    """The judge's, independent of what happened to the fruit afterwards: it is compared with limits."""
     points: tuple[tuple[float, float], ...]
     """Closing in mm and area in mm²."""
     growth_mm2_per_mm: float | None

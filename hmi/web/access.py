@@ -52,7 +52,7 @@ def address_of(request: Request) -> str:
 
 
 def holder_of(request: Request) -> str:
-    """Return whom a request's places and turns count for: the person, or the address where nobody is logged in."""
+    """Return the holder of a request's places and turns: the person, or the address where nobody is logged in."""
     caller = caller_of(request)
     return f"person {caller.name}" if caller.name else address_of(request)
 
@@ -102,10 +102,10 @@ def _with_right(caller: Caller, right: Right) -> Caller:
 
 
 def known(caller: Caller) -> Caller:
-    """Return a caller who is logged in, in whatever role.
+    """Return a caller who is logged in, in any role.
 
     Raises:
-        Problem: 403, nobody is.
+        Problem: 403, the caller is not logged in.
     """
     if not caller.name:
         raise Problem(403, "problem.not_allowed", role=Role.OPERATOR)

@@ -30,7 +30,7 @@ class LoginRateLimiter:
         self._logged_in: OrderedDict[tuple[str, str], None] = OrderedDict()
 
     def knows(self, address: str) -> bool:
-        """Return whether an address is the station's own screen, or somebody has logged in there before."""
+        """Return whether an address is the station's own screen, or a person has logged in there before."""
         return is_this_machines(address) or any(where == address for _, where in self._logged_in)
 
     def wait_s(self, name: str, address: str) -> float:

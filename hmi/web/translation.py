@@ -154,7 +154,7 @@ class Locale:
         """Write a message in this language. A text that is not the station's is marked as English on other pages.
 
         Args:
-            said: a message, or words of a library, an operating system or a record of before there were messages;
+            said: a message, or a text of a library, of an operating system or of a record from before messages;
                 None for an empty text.
         """
         if isinstance(said, Message) and said.id != VERBATIM.id:

@@ -77,7 +77,7 @@ class UserStore:
 
     @property
     def first_start(self) -> bool:
-        """True until somebody has set the first administrator's PIN, here or by `station administrator`."""
+        """True until the first administrator's PIN is set, here or by `station administrator`."""
         if not self._people and not self.broken:
             self._people = self._read()
         return not self._people and not self.broken

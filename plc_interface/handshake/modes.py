@@ -31,7 +31,7 @@ class Service(StrEnum):
     IN_SERVICE = "in service"
     OFFLINE = "offline"
     ENDING = "ending"
-    """As OFFLINE, whatever the PLC writes."""
+    """As OFFLINE, independent of what the PLC writes."""
 
 
 class Trigger(StrEnum):

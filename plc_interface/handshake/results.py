@@ -31,7 +31,7 @@ def take(work: Work) -> None:
 
 
 def take_unwritten(work: Work, sequence: int) -> None:
-    """Take what the PLC had taken before a start, also where a full disk kept its acknowledgement from the journal.
+    """Take what the PLC had taken before a start, also where a full disk left its acknowledgement out of the journal.
 
     Args:
         work: the PLC's first write.

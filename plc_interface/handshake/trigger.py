@@ -7,7 +7,7 @@ from station.channel.line import Refusal
 
 
 def obstacle(state: State) -> Refusal | None:
-    """Return why no trigger is accepted now, whatever its id; None if the station would be asked."""
+    """Return why no trigger is accepted now, independent of its id; None where the request may go to the station."""
     waiting = len(state.queue)
     reasons: tuple[tuple[bool, Refusal], ...] = (
         (state.service is not Service.IN_SERVICE, Refusal.OFFLINE),
@@ -22,7 +22,7 @@ def obstacle(state: State) -> Refusal | None:
 
 
 def refusal(state: State) -> Refusal | None:
-    """Return why the trigger with the present id is refused; None if the station is asked.
+    """Return why the trigger with the present id is refused; None where the request goes to the station.
 
     A repeated id has precedence over all other reasons: no other refusal then names an id that was accepted.
     """

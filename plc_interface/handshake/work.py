@@ -25,7 +25,7 @@ class Work:
     actions: list[Action] = field(default_factory=list)
     signals: deque[Signal] = field(default_factory=deque)
     durable: bool = False
-    """Whether the journal holds news that nobody else has, and that has to outlive a loss of power."""
+    """Whether the journal has news that is stored nowhere else, and that has to survive a loss of power."""
     found: Outcome | None = None
     """The outcome that the signal OUTCOME or FOREIGN_OUTCOME is about."""
     size: Size = NO_SIZE
@@ -79,7 +79,7 @@ ResultT = TypeVar("ResultT")
 
 
 def described(words: str, rule: Callable[[Work], ResultT]) -> Callable[[Work], ResultT]:
-    """Return a guard or effect of one expression, with these words as its docstring."""
+    """Return a guard or effect of one expression, with this text as its docstring."""
     rule.__doc__ = words
     return rule
 

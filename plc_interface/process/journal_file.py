@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 _RESERVE_BYTES = 1 << 20
 """Twenty of the largest journals: 64 outcomes that the station has not noted take about 50 kB."""
 _BLOCK_BYTES = 4096
-"""A file system's; the reserve is given up in such pieces, so that whoever fills the disk gets nothing of it."""
+"""A file system's; the reserve is released in such pieces, so that a program that fills the disk gets nothing of it."""
 
 
 class JournalFile:

@@ -86,7 +86,7 @@ class Noise(Stored):
 
 
 class Run(Stored):
-    """One run at the ball, whatever came of it."""
+    """One run at the ball, with any result."""
 
     schema_version: Literal[1, 2] = 2
     """1: with sentences in the place of messages."""

@@ -22,7 +22,7 @@ _ROOM = 1.04
 _PRESS_COLOURS = 7
 """In the style sheet; a further press has the first one's again."""
 _PRESS_COLUMNS = 2
-"""Of the legend of presses, as many as its words allow."""
+"""Of the legend of presses, as many as its texts allow."""
 
 Mark = Literal["point", "decided", "doubtful", "bound", "wrong"]
 """Sign of one point: measured, the one that decided, doubtful, a lower bound, or one that does not fit the others."""
@@ -55,7 +55,7 @@ class Limit(NamedTuple):
 
 
 class Texts(NamedTuple):
-    """The chart's words, in one language."""
+    """The chart's texts, in one language."""
 
     label: str
     """What the chart shows, for who cannot see it."""
@@ -68,7 +68,7 @@ class Texts(NamedTuple):
     """Beside a line at closing 0; none if empty."""
     legend: Sequence[tuple[Kind | Mark, str]] = ()
     presses: Sequence[str] = ()
-    """For the legend: each press's words, in the order of their numbers."""
+    """For the legend: each press's text, in the order of their numbers."""
 
 
 class Size(NamedTuple):
@@ -271,7 +271,7 @@ def _press_numbers(curves: Sequence[Curve], x: Axis, y: Axis, text: int) -> str:
 
 
 def _press_legend(presses: Sequence[str], left: float, column: float, high: float, text: int) -> str:
-    """Write each press's words beside a piece of its line, column by column."""
+    """Write each press's text beside a piece of its line, column by column."""
     parts, rows = [], ceil(len(presses) / _PRESS_COLUMNS)
     for place, words in enumerate(presses):
         x, at = left + place // rows * column, high + (1.5 * (place % rows) + 0.7) * text

@@ -118,7 +118,7 @@ class _Observer:
 
 
 class _Recording:
-    """Folder of one grip; written steps remain, whatever fails later."""
+    """Folder of one grip; written steps remain, also where a later one fails."""
 
     def __init__(self, folder: Path) -> None:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):

@@ -23,7 +23,7 @@ _MARKS: dict[str, Mark | None] = {"good": "good", "bad": "bad", "none": None}
 @by_option
 @config_option
 def mark(sequences: tuple[int, ...], word: str, by: str, config: Path | None) -> None:
-    """Mark fruit as good or bad, whatever the station judged; `none` removes a mark.
+    """Mark fruit as good or bad, independent of the station's outcome; `none` removes a mark.
 
     `station thresholds` proposes limits from the marks. All of the fruit are marked, or none.
     """

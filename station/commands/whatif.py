@@ -101,7 +101,7 @@ def _page(
 
 
 def _changes(recipes: Sequence[Recipe | None], draft: Recipe) -> Sequence[Difference] | str:
-    """Return what the draft changes of the recipe of all fruit; in words why it is not known."""
+    """Return what the draft changes of the recipe of all fruit, or a text with the reason why it is not known."""
     if len(recipes) > 1:
         return f"These fruit were inspected by {len(recipes)} revisions, so there is no single one to compare with."
     (own,) = recipes

@@ -23,7 +23,7 @@ PRIORITIES: dict[Priority, str] = {
     Priority.MEDIUM: "Inspections are not made, or good fruit is lost.",
     Priority.LOW: "It can wait for the next pause.",
 }
-"""What each asks for."""
+"""Criterion of each."""
 
 
 class AlarmId(StrEnum):

@@ -13,7 +13,7 @@ from station.messages.message import Message
 LONGEST_SHELVED_S = 8 * 3600.0
 """One shift: what is hidden for longer is not an alarm."""
 CHATTER_RAISES, CHATTER_S = 3, 60.0
-"""An alarm raised so often within this time chatters: it stays until it was quiet for as long."""
+"""An alarm raised so often within this time chatters: it stays until its cause was absent for as long."""
 
 
 class AlarmState(StrEnum):
@@ -170,7 +170,7 @@ class Alarms:
         return alarms
 
     def reset(self, alarm: AlarmId) -> Self:
-        """A person lets go a latched one whose cause is gone, also one that chattered until just now."""
+        """A person resets a latched one whose cause is gone, also one that chattered until just now."""
         was = self.get(alarm)
         is_gone = ALARMS[alarm].latched and was.quiet_since_s is not None
         return self._with(_moved(_returned_for_good(was) if is_gone else was, E.RESET))
@@ -203,7 +203,7 @@ class Alarms:
 
     @property
     def active(self) -> tuple[Alarm, ...]:
-        """Of those shown, the ones whose cause is there or that are latched."""
+        """Of the shown alarms, those whose cause is there or that are latched."""
         return tuple(alarm for alarm in self.annunciated() if alarm.state in ACTIVE)
 
     @property
@@ -241,7 +241,7 @@ def _moved(alarm: Alarm, event: AlarmEvent) -> Alarm:
 
 
 def _ticked(alarm: Alarm, now_s: float) -> Alarm:
-    """An alarm after what time alone does; a clock that was set back hides or keeps nothing for longer."""
+    """An alarm after what time alone changes; a clock set back prolongs neither shelving nor chattering."""
     if alarm.shelved_until_s is not None and not 0 <= alarm.shelved_until_s - now_s <= LONGEST_SHELVED_S:
         alarm = _moved(alarm, E.UNSHELVED)
     if alarm.quiet_since_s is not None and not 0 <= now_s - alarm.quiet_since_s < CHATTER_S:

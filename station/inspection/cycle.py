@@ -87,7 +87,7 @@ class Action(StrEnum):
     GO_HOME = "go_home"
     """Bring the arm to where it waits, and open the jaws fully meanwhile: HOME. Idempotent."""
     CHECK_DEVICES = "check_devices"
-    """Look at the known health, without waiting: READY, STOP where one was asked for, or what is wrong."""
+    """Read the known health, without waiting: READY, STOP where one was requested, or what is wrong."""
     RECORD_TRIGGER = "record_trigger"
     """TRIGGER_RECORDED."""
     REFUSE_TRIGGER = "refuse_trigger"
@@ -119,7 +119,7 @@ class Action(StrEnum):
     RECORD = "record"
     """Make the outcome durable: RECORDED."""
     PUBLISH = "publish"
-    """Hand the recorded outcome to whoever waits for it, or comes for it later; it waits for nobody."""
+    """Pass the recorded outcome to the callers that wait for it now or later; the action does not wait for them."""
     PLACE_ACCEPT = "place_accept"
     """PLACED: carried to the accept place, or left in the nest where the line itself diverts; the jaws open."""
     PLACE_REJECT = "place_reject"
@@ -155,7 +155,7 @@ class Row(NamedTuple):
 
 
 START = Transition(State.UNKNOWN, (Action.READ_DEVICES,))
-"""How a process begins where no hold was kept: nothing is known of devices and fruit until they were read."""
+"""How a process begins where no hold was stored: nothing is known of devices and fruit until they were read."""
 
 REASONS: dict[Event, Reason] = {
     Event.NO_ONSET: Reason.NO_CONTACT,

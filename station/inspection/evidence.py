@@ -1,7 +1,7 @@
 """Evidence of a press in numbers: areas at given closings, the growth, and where the curve does not rise.
 
-Every number is asked for twice: as the most that it may be, from all points, and as the least that it surely is,
-from trusted points alone. The first keeps a fruit from PASS, the second proves a FAIL.
+Every number is computed twice: as an upper bound from all points, and as a lower bound from trusted points alone.
+The upper bound decides against a PASS, the lower bound proves a FAIL.
 """
 
 from collections.abc import Sequence
@@ -97,9 +97,9 @@ class Evidence:
     def excused(self) -> list[Measured]:
         """Needed points that a PASS does without, since their confidence is too small or their edge was lost.
 
-        The area rises with the closing: where the last needed point is trusted and within its limit, what lies before
-        it is smaller, whatever an image there shows. An earlier limit is then kept by what was measured there, trusted
-        or not. What such a point may spoil, the onset, is asked of the others too.
+        The area rises with the closing: where the last needed point is trusted and within its limit, every earlier
+        area is smaller, also where its image shows another one. An earlier limit is then judged by what was measured
+        there, trusted or not. Such a point may spoil the onset; the other points are checked for that too.
         """
         if not self.needed:
             return []

@@ -1,6 +1,6 @@
 """The judge: a press and its recipe → PASS, FAIL or NO_RESULT, with a message for every reason.
 
-PASS requires that every limit was measured by trusted points and is kept with the uncertainty added. FAIL requires a
+PASS requires that every limit was measured by trusted points and is met with the uncertainty added. FAIL requires a
 trusted proof. Everything else is NO_RESULT, which the line diverts like FAIL. Why the lines are drawn as they are:
 docs/decisions/0015 and 0057.
 """
@@ -32,7 +32,7 @@ class Finding:
     limit: float | None = None
     closing_mm: float | None = None
     proves: bool = False
-    """It alone proves the fruit damaged; else it keeps the measurement from being trusted."""
+    """It alone proves the fruit damaged; else it is a reason not to trust the measurement."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +201,7 @@ class _Case:
 
     @cached_property
     def findings(self) -> list[Finding]:
-        """Limits that are or may be passed, and what keeps the measurement from being trusted."""
+        """Limits that are or may be exceeded, and the reasons why the measurement is not trusted."""
         if self.nothing:
             return []
         damage = [] if self.limits.problem is not None else _damage(self.evidence, self.limits)
@@ -224,7 +224,7 @@ class _Case:
 
     @property
     def may_be_larger(self) -> bool:
-        """True if the limits are kept and nothing is in doubt but that the contact may reach further than was seen.
+        """True if the limits are met and the only doubt is that the contact may reach further than was seen.
 
         An area too small for any fruit, a wrong reference or a saturated image speak against the whole press, and so
         do areas that do not rise.
@@ -247,7 +247,7 @@ class _Case:
 
     @property
     def _doubts(self) -> set[Flag]:
-        """Flags that keep needed steps from being trusted, those of excused steps left out."""
+        """Flags for which needed steps are not trusted, those of excused steps left out."""
         needed = [point for point in self.evidence.needed if point not in self.evidence.excused]
         return {flag for point in needed for flag in self.evidence.doubts(point)}
 

@@ -86,7 +86,7 @@ def _longest_run(values: npt.NDArray[np.float64], floors: npt.NDArray[np.float64
     """Places of the longest run in which no value falls below the floor of one before it, in no order.
 
     Dynamic programming over the run's last place and its length, in quadratic time and memory where any value falls: of
-    all runs of one length the one with the lowest highest floor is continued by whatever continues another.
+    all runs of one length, a value that continues any of them continues the one with the lowest highest floor.
     """
     if (values[1:] >= np.maximum.accumulate(floors)[:-1]).all():
         return list(range(values.size))

@@ -42,8 +42,8 @@ class Press:
     onset_mm: float | None
     """The measured gripper width at first contact, so the fruit's width; None where nothing was touched."""
     onset_uncertainty_mm: float | None
-    """How much sooner the contact may have begun: from the last image without it to the first with it. None where every
-    image shows a contact: then it may have begun anywhere, and no closing is known."""
+    """How much sooner the contact may have started: from the last image without it to the first with it. None where
+    every image shows a contact: then it may have started anywhere, and no closing is known."""
     points: tuple[Measured, ...]
     """In any order."""
     interruptions: tuple[Reason, ...] = ()

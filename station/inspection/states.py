@@ -64,7 +64,7 @@ class StateFacts(NamedTuple):
     refusal: Refusal | None
     """Why a trigger is not accepted; None where it is."""
     text: Definition
-    """What is going on, and where a trigger is not accepted what ends it."""
+    """The activity, and where a trigger is not accepted what ends it."""
     needs_person: bool = False
     """Nothing but a person's confirmation leads on."""
     may_exit: bool = False
@@ -72,12 +72,12 @@ class StateFacts(NamedTuple):
 
     @property
     def activity(self) -> Message:
-        """Description of what is going on in the state."""
+        """Description of the activity in the state."""
         return self.text()
 
     @property
     def reason(self) -> Message:
-        """The same for whoever waits: during an inspection also that it has to end."""
+        """The same for a caller that waits: during an inspection also that it has to end."""
         return joined((self.activity, texts.WAIT())) if self.refusal is Refusal.BUSY else self.activity
 
 

@@ -82,5 +82,5 @@ def budget_at(closing_mm: float, press: Press, limits: SizedLimits) -> Budget:
 
 
 def rectangular(width: float) -> float:
-    """The standard uncertainty of what lies anywhere in an interval of this width alike (GUM 4.3.7)."""
+    """The standard uncertainty of a rectangular distribution of this width (GUM 4.3.7)."""
     return width / sqrt(12)

@@ -1,4 +1,4 @@
-"""Messages of a grip: what kept it from its end, what the jaws do, and why a picture may not be the reference."""
+"""Messages of a grip: why it did not end as planned, what the jaws do, and why an image may not be the reference."""
 
 from station.messages.message import Listed, Nested, Number, define
 

@@ -1,4 +1,4 @@
-"""Message: what the station says, as an id with typed parameters; a sentence is made where somebody reads it."""
+"""Message of the station: an id with typed parameters; the sentence is made where it is read."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -41,7 +41,7 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Name:
-    """A text that is the same in every language: a name, an address, a path, what a library said."""
+    """A text that is the same in every language: a name, an address, a path, a library's text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,10 +67,10 @@ _ACCEPTED: dict[type[Any], type[Any] | tuple[type[Any], ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """One thing that the station can say. Call it with its parameters to get a `Message`."""
+    """One message that the station can give. Call it with its parameters to get a `Message`."""
 
     id: str
-    """Room and what is said, as `gripper.too_hot`; also the context of its translations."""
+    """Area and content, as `gripper.too_hot`; also the context of its translations."""
     english: str
     """The sentence, with each parameter in braces. Where it depends on a number, the form for one."""
     parameters: Mapping[str, Kind]
@@ -211,11 +211,11 @@ ENGLISH = Renderer(lambda known, count: known.plural if known.plural and count !
 """For logs and the command line."""
 
 VERBATIM = define("text.verbatim", "{text}")
-"""Words that are not the station's: a library's, the operating system's, a person's; or of records before messages."""
+"""A text that is not the station's: a library's, the operating system's, a person's; or of records before messages."""
 
 
 def verbatim(text: str) -> Message:
-    """Make a message of words that are not the station's own: they are shown as they are in every language."""
+    """Make a message of a text that is not the station's own: it is shown as it is in every language."""
     return VERBATIM(text=text)
 
 
@@ -226,7 +226,7 @@ def message_of(error: BaseException) -> Message:
 
 
 def message_in(text: str) -> Message | None:
-    """Read a message that a text field holds as JSON, empty for none; words of versions before messages as they are."""
+    """Read a message that a text field holds as JSON, empty for none; a text from before messages as it is."""
     try:
         return Message.model_validate_json(text) if text else None
     except ValidationError:

@@ -1,4 +1,4 @@
-"""Messages of the records: what keeps a request from being carried out, and what to do."""
+"""Messages of the records: why a request cannot be carried out, and what to do."""
 
 from station.messages.message import Nested, Number, define
 

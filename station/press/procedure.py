@@ -37,12 +37,12 @@ class Observer(Protocol):
         ...
 
     async def see_step(self, step: Step) -> bool:
-        """Get a step of the press, the last one before the contact first, and say whether another may be made."""
+        """Get a step of the press, the last one before the contact first, and return whether another may be made."""
         ...
 
 
 async def press(rig: MovingRig, recipe: Recipe, observer: Observer) -> None:
-    """Press what lies at the nest, if anything, and release, whatever happens. Not idempotent: each call presses.
+    """Press what is in the nest, if anything, and release it in any case. Not idempotent: each call presses.
 
     Raises:
         GripError: no sound frame came, nothing was touched, or the fingers or the arm did not return.
@@ -168,7 +168,7 @@ class _Search:
     async def first_contact(
         self, from_mm: float, at: Position | None = None, *, seen_clear: bool = False
     ) -> tuple[float, Step | None, Step]:
-        """Return the width asked for where the gel was touched first, the step before it, and that step.
+        """Return the requested width of the first contact, the step before it, and the step itself.
 
         Args:
             from_mm: where the search begins.
@@ -199,7 +199,7 @@ class _Search:
         """Confirm a contact by as many frames as a step has, at the same width; else search on.
 
         Args:
-            width_mm: that was asked for.
+            width_mm: as requested.
             before: the last step without a contact.
             touching: the first with one; its frame is the first of those that confirm it.
         """

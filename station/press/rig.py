@@ -110,11 +110,11 @@ class Rig(Protocol):
         ...
 
     async def leave_nest(self) -> None:
-        """Bring the fingers away from where the fruit lies; without an arm nothing moves."""
+        """Move the fingers away from the fruit's place; without an arm nothing moves."""
         ...
 
     async def enter_nest(self) -> None:
-        """Bring the fingers to where the fruit lies; without an arm nothing moves."""
+        """Move the fingers to the fruit's place; without an arm nothing moves."""
         ...
 
     async def open(self, width_mm: float | None = None) -> Position:

@@ -72,7 +72,7 @@ def ends_steps(press: Press, recipe: Recipe) -> bool:
 
 
 def is_last_step(recipe: Recipe, closed_steps: int, next_width_mm: float, reached: Position) -> bool:
-    """Return whether the captured step is the last that can be made, whatever it shows.
+    """Return whether the captured step is the last that can be made, independent of what it shows.
 
     Args:
         closed_steps: steps of the recipe by which the fingers have closed since the first image.

@@ -53,7 +53,7 @@ class RecipeState:
     file: ValidFile | None
     """None if it is invalid or missing."""
     submitted: Revision | None
-    """The draft that waits for approval, whatever the file's state."""
+    """The draft that waits for approval, independent of the file's state."""
     note: Message | None
     """Information or instruction for a person; None if the file is the approved revision."""
 

@@ -120,10 +120,10 @@ class RecipeStore(RecipeReader):
             return _history_has_begun(connection)
 
     def _require_history(self) -> None:
-        """Refuse a person's change before the history has begun.
+        """Refuse a person's change before the history has started.
 
         Raises:
-            RecipeStoreError: it has not begun.
+            RecipeStoreError: it has not started.
         """
         if not self._has_begun():
             raise RecipeStoreError(messages.HISTORY_NOT_BEGUN())

@@ -112,7 +112,7 @@ def continue_audit(connection: Connection, known: Head | None) -> AuditRow | Non
 def note_unsigned(connection: Connection, known: Head | None) -> None:
     """Append, at a start, a row if rows follow the signed head.
 
-    A killed station left them, or somebody else wrote them.
+    A killed station left them, or others wrote them.
     """
     last = last_row(connection)
     if known is not None and last is not None and last.seq > known.seq and _continues(connection, known, last):

@@ -18,7 +18,7 @@ from station.records.errors import (
 )
 
 Mapped = tuple[type[RecordsError], Definition, Definition]
-"""Kind, cause with place and words, and remedy."""
+"""Kind, cause with place and text, and remedy."""
 
 _FULL: Mapped = (DiskFullError, messages.DISK_FULL, messages.FREE_SPACE_OR_QUOTA)
 _READ_ONLY: Mapped = (ReadOnlyError, messages.NOT_WRITABLE, messages.MAKE_WRITABLE)

@@ -35,7 +35,7 @@ def html_report(lot: LotSummary, station: str) -> str:
 
 
 def _css(text: str) -> str:
-    """Return a text for a quoted string of CSS, where a name from outside is only letters whatever it contains."""
+    """Return a text for a quoted CSS string: all but ASCII letters and digits escaped, as names come from outside."""
     return "".join(sign if sign.isascii() and sign.isalnum() else f"\\{ord(sign):06x}" for sign in text)
 
 

@@ -1,4 +1,4 @@
-"""Opening of a records folder, whatever its state after a crash or damage."""
+"""Opening of a records folder, in any state after a crash or damage."""
 
 import fcntl
 import logging

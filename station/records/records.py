@@ -188,7 +188,7 @@ class Records:
             The sequence, higher than any given before, by any database in this folder.
 
         Raises:
-            RecordsError: nothing was begun, or it was withdrawn.
+            RecordsError: nothing was started, or it was withdrawn.
         """
         opened = self._get()
 
@@ -228,7 +228,7 @@ class Records:
             The outcome in force: this record's, or the one that was published or concluded before.
 
         Raises:
-            UnknownInspectionError: this sequence was not begun.
+            UnknownInspectionError: no inspection has this sequence.
             RecordsError: it may not be durable; the PLC must not see a result of it.
         """
         opened = self._get()
@@ -273,7 +273,7 @@ class Records:
     async def published(self, outcome: Outcome) -> bool:
         """Store that the PLC was given an outcome; it overrides the judgement. The first one remains: idempotent.
 
-        An inspection that this database does not know, as one begun before a damaged database was moved aside, is
+        An inspection that this database does not know, as one started before a damaged database was moved aside, is
         recorded from the outcome itself. True for the first time, so that it is counted once: without a deadline, as
         the answer to a slow write would be lost, and that to its repetition is False.
 
@@ -322,7 +322,7 @@ class Records:
         return await self._ask(work)
 
     async def change_to_end(self, work: Work[T]) -> T:
-        """As `change`, with no deadline: the answer is what the records have, whatever time the disk takes."""
+        """As `change`, with no deadline: the answer is what the records have, however long the disk takes."""
         return await asyncio.wrap_future(self._get().writer.submit(work))
 
     def status(self) -> Status:

@@ -38,9 +38,9 @@ class Query:
     grower: str | None = None
     """The lot's grower, as registered with its start."""
     from_utc_ms: int | None = None
-    """Begun at this time or later."""
+    """Started at this time or later."""
     to_utc_ms: int | None = None
-    """Begun before this time."""
+    """Started before this time."""
     outcome: OutcomeName | None = None
     """The outcome in force."""
     reason: Reason | None = None
@@ -203,7 +203,7 @@ def _merged(heads: Iterable[tuple[str, int]], find: Callable[[str, int], tuple[i
 
 
 def _in_time(database: sqlite3.Connection, from_utc_ms: int, to_utc_ms: int | None) -> Seek:
-    """Return the spans of numbers begun in the given hours."""
+    """Return the spans of numbers given in these hours."""
     last_hour = 2**62 if to_utc_ms is None else (to_utc_ms - 1) // HOUR_MS
     spans = database.execute(
         "SELECT first_sequence, coalesce((SELECT next.first_sequence FROM hours AS next WHERE next.first_sequence > "

@@ -105,7 +105,7 @@ def _key(folder: Path) -> Ed25519PrivateKey:
 
 @functools.lru_cache(maxsize=1)
 def _parsed(pem: bytes) -> Ed25519PrivateKey | None:
-    """Return the key of a file's content; kept, because parsing takes longer than signing does."""
+    """Return the key of a file's content; cached, because parsing takes longer than signing does."""
     try:
         key = serialization.load_pem_private_key(pem, password=None)
     except (ValueError, TypeError, UnsupportedAlgorithm):

@@ -289,11 +289,11 @@ class DamageThresholds(Settings):
         return self.accepted(*wrong, *self._kept_by_no_area())
 
     def _kept_by_no_area(self) -> list[tuple[Path, Message]]:
-        """Find the limits that no area keeps with its guard band on either side, where no fruit would pass by that.
+        """Find limits that no area meets with its guard band on either side, if no fruit would pass for that reason.
 
         The guard band is that of the repeatability alone, which every press has. Its other components, and a fruit's
         size, are the press's. A fruit whose area is too small at one limit is not trusted there, and left to the others
-        unless every limit decides: by `every_trusted` it has to keep the last, by `first_trusted` any.
+        unless every limit decides: by `every_trusted` it has to meet the last, by `first_trusted` any.
         """
         wrong: list[tuple[Path, Message]] = []
         for index, limit in enumerate(self.area):

@@ -15,7 +15,7 @@ _LIGHT_TOUCH = 0.5
 """Share of a limit's closing from which the judge takes its steps into account: `LIGHT_TOUCH` of `inspection.evidence`,
 which no settings import."""
 _AT_CLOSING_MM = 0.22
-"""A step asked for so little before a closing may be taken for one at it: the gripper goes to the nearest count, of
+"""A step requested so little before a closing may be taken for one at it: the gripper goes to the nearest count, of
 85 mm / 227 = 0.37 mm, and the judge takes what is 0.03 mm short for the closing, `AT_MM` of `inspection.evidence`."""
 
 
@@ -284,7 +284,7 @@ class Recipe(Settings):
 
         A limit is judged by the steps from a light touch's end, a share of the first closing that is judged with it, to
         the first at its closing or beyond; so one step has to be before it. Not covered: a gripper's count may make
-        the only step before it shorter than asked for, and then a light touch.
+        the only step before it shorter than requested, and then a light touch.
         """
         wrong: list[tuple[Path, Message]] = []
         area, step_mm = self.damage.area, self.steps.step_mm

@@ -17,7 +17,7 @@ SPREAD = 6.0
 """Standard deviations in a variation's span, compared with the tolerance; 99.73 % of a normal distribution."""
 _ROUNDING = 1e-12
 """Share of the largest value: a smaller difference of means is the computer's rounding (2e-16 of a value), not a
-variation. The variation of identical repeats is 0, whatever the values."""
+variation. The variation of identical repeats is 0 for any values."""
 
 
 @dataclass(frozen=True, slots=True)

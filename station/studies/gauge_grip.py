@@ -1,4 +1,4 @@
-"""One press on the twin by the station's own procedure: what lies between gel and sponge, imaged and measured."""
+"""One press on the twin by the station's own procedure: images and measurement of what is between gel and sponge."""
 
 import asyncio
 from collections.abc import Callable
@@ -39,7 +39,7 @@ CALIBRATION_SD = 0.011
 calibrate` states at three places (docs/calibration.md)."""
 
 GoesOn = Callable[[float, Contact], bool]
-"""Gets a step's closing, mm, and its contact; says whether another step is to be made."""
+"""Gets a step's closing, mm, and its contact; returns whether another step is to be made."""
 
 
 def last_limit_mm(recipe: Recipe) -> float:
@@ -68,7 +68,7 @@ class Onset(NamedTuple):
     width_mm: float
     """The true one."""
     uncertainty_mm: float
-    """How much sooner it may have begun."""
+    """How much sooner it may have started."""
     contact: Contact
 
 

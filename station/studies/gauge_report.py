@@ -20,7 +20,7 @@ GOOD, BEARABLE = 10.0, 30.0
 
 
 def aiag_class(gauge: Gauge) -> tuple[str, str]:
-    """Return AIAG's judgement of such a gauge, as a class of the page's style and in words."""
+    """Return AIAG's judgement of such a gauge, as a class of the page's style and as a text."""
     grr = gauge.component("GRR")
     percent, of = (
         (grr.study_percent, "the total variation")

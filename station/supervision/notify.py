@@ -52,7 +52,7 @@ async def _extend_start() -> None:
 async def feed_watchdog(progressing: Callable[[], bool]) -> None:
     """Feed the supervisor's watchdog as long as there is progress, and end this process when it is orphaned.
 
-    Runs until cancelled, and asks for progress several times in each time-out. A supervisor that was killed cannot end
+    Runs until cancelled, and checks progress several times in each time-out. A supervisor that was killed cannot end
     its processes, so they end themselves, by the same SIGTERM that it would have sent.
     """
     timeout_s = int(os.environ.get(WATCHDOG_VARIABLE, "0")) / 1e6

@@ -3,7 +3,7 @@
 Nothing secret is in it by construction: only what is listed here is written. Passwords, PINs, tokens and keys are in
 files of their own, which nothing here reads; the configuration holds only their paths. Images are left out for their
 size, the file of people and the audit trail because they are personal. Logs and alarms name people all the same:
-without them nobody could help.
+support needs them.
 """
 
 import contextlib

@@ -1,1 +1,1 @@
-"""The simulated world on the real wire protocols; nobody in the station imports it."""
+"""The simulated world on the real wire protocols; in the station only the studies import it."""

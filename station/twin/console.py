@@ -23,7 +23,7 @@ class ConsoleError(StationError):
 
 
 class ConsoleRefusalError(BadInputError):
-    """The console does not know, or does not take, what was asked."""
+    """The console does not know the request, or refuses it."""
 
 
 class ConsoleServer:
@@ -44,7 +44,7 @@ class ConsoleServer:
 
     @property
     def address(self) -> tuple[str, int]:
-        """Host and port that the console listens on; the port is a free one where 0 was asked for."""
+        """Host and port that the console listens on; the port is a free one where 0 was given."""
         if self._server is None:
             return self._host, self._port
         return self._server.sockets[0].getsockname()[:2]
@@ -117,14 +117,14 @@ class ConsoleServer:
 
 
 def ask(host: str, port: int, request: Mapping[str, Any], timeout_s: float = 3.0) -> Any:
-    """Ask a running twin's console one thing, `do` and what it needs; connection and answer have `timeout_s` each.
+    """Send a running twin's console one request, `do` and what it needs; connection and answer have `timeout_s` each.
 
     Returns:
         The answer's result.
 
     Raises:
         ConsoleError: no twin answers there.
-        ConsoleRefusalError: it does not take what was asked; its words are the message.
+        ConsoleRefusalError: the console refuses the request; its text is the message.
     """
     try:
         with socket.create_connection((host, port), timeout_s) as connection, connection.makefile("rwb") as stream:

@@ -46,7 +46,7 @@ class Damage:
 
 
 class Severity(StrEnum):
-    """The damage that can be asked for by name."""
+    """The damage that can be selected by name."""
 
     SEVERE = "severe"
     MILD = "mild"

@@ -1,4 +1,4 @@
-"""The skin of each fruit as a height map: how far it lies below its own highest points, in mm.
+"""The skin of each fruit as a height map: its depth below its own highest points, in mm.
 
 Sizes from observation of the fruit: strawberry achenes 1.5 to 2.5 by 1 to 1.5 mm in pits, raspberry drupelets of
 2 to 3 mm, a blueberry's crown of five lobes around a hollow.
@@ -23,7 +23,7 @@ def smooth(x_mm: FloatArray, _y_mm: FloatArray, _generator: np.random.Generator)
 
 
 def achenes(x_mm: FloatArray, y_mm: FloatArray, generator: np.random.Generator) -> FloatArray:
-    """A strawberry's pits with a seed standing in each."""
+    """A strawberry's pits with a seed in each."""
     depth = np.zeros_like(x_mm)
     for centre_x, centre_y in _lattice(3.4, 0.5, generator):
         length_mm, width_mm = generator.uniform(1.5, 2.5), generator.uniform(1.0, 1.5)

@@ -50,7 +50,7 @@ class World:
         """How far the sensor is from where the fruit was laid against it, to the right and down in its image; None
         where the fingers are not around the fruit. On a bench without an arm it stays there."""
         self.opening_mm: Callable[[], float] = lambda: self._opening_mm
-        """The gripper's opening now; where no gripper is wired, the one that `force_N` was last asked for."""
+        """The gripper's opening now; where no gripper is wired, the one that `force_N` was last called with."""
 
     @property
     def fruit(self) -> Fruit | None:
@@ -62,7 +62,7 @@ class World:
 
         Args:
             pose: where it meets the gel; the middle where left out.
-            holder_mm: what it lies on takes so much of the room between the fingers.
+            holder_mm: room between the fingers that the holder under it takes.
         """
         self._holder_mm = holder_mm
         self._pose = pose or Pose()

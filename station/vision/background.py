@@ -4,7 +4,7 @@ Per colour the model is a sum of low cosines over the frame (LEDs and exposure d
 borders (the gel as a whole is pushed towards its LEDs), a gain on the reference, and a displacement of the reference's
 own pattern of light. It is fitted by iterated re-weighting with Tukey's biweight (P. J. Huber, Robust Statistics,
 section 7.8), so that a contact, which follows none of these shapes, does not pull it. A normal prior on each
-coefficient keeps the model from explaining a contact; within a press the prior's mean is the last step's model.
+coefficient prevents the model from explaining a contact; within a press the prior's mean is the last step's model.
 """
 
 from dataclasses import dataclass

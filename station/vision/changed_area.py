@@ -2,7 +2,7 @@
 
 It is the number of pixels whose change, without the background and after flat-field correction, is longer than a few
 times the background's noise. It takes in the halo around a contact and misses a flat centre, so it is no contact area;
-but it rises with the contact whatever the body, and where it and the contour disagree, the contour is not to be
+but it rises with the contact for every body, and where it and the contour disagree, the contour is not to be
 trusted.
 """
 

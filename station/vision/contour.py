@@ -124,12 +124,12 @@ def find_edge(
 
     Args:
         length: of the smoothed change, shape (height, width), grey levels.
-        region: where the contact lies, halo and all, shape (height, width), 0 or not.
+        region: where the contact is, with its halo, shape (height, width), 0 or not.
         rays: the region's, at that size.
         radii: how far the region reaches on them, shape (64,).
         stiffness: cost of a jump of one step between neighbouring rays, in units of a steep ray's fall.
         constants: which fall counts as steep, and when a contact is mirrored.
-        floor: what surely lies within the edge, 0 or not.
+        floor: what is surely within the edge, 0 or not.
     """
     left, top, right, bottom = (0, 0, 0, 0) if floor is not None else _mirrored(region, constants)
     if not (left or top or right or bottom):

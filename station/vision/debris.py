@@ -1,8 +1,8 @@
 """Debris on the gel: dents that the reference shows too, which a contact hides or moves about.
 
 Under a contact a particle's own pattern is missing from the frame, so the change shows the particle although nothing of
-it is new. Where the change is shorter with that pattern given back, the particle is hidden, and that is taken. Where it
-is not, the particle still stands out, its slope has not changed, and the place says nothing: it is filled from around.
+it is new. Where the change is shorter with that pattern given back, the particle is hidden, and that is used. Where it
+is not, the particle is still visible, its slope has not changed, and the place is of no use: it is filled from around.
 """
 
 import cv2

@@ -56,7 +56,7 @@ def find_outline(
         background: of the same frame.
         stiffness: as for `find_edge`.
         constants: as for `find_edge` and the texture.
-        floor: what surely lies within, shape of `length`, 0 or not.
+        floor: what is surely within it, shape of `length`, 0 or not.
     """
     height, width = length.shape
     if not body.textured:

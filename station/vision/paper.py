@@ -1,4 +1,4 @@
-"""The published pipeline as printed, kept as it is to compare with.
+"""The published pipeline as printed, unchanged, for comparison.
 
 Source: Computers and Electronics in Agriculture 235 (2025) 110397, image processing of the tactile images:
 difference to the untouched gel, amplification, non-local means, K-means, morphology, connected components.

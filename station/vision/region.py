@@ -3,7 +3,7 @@
 A body's edge alone misleads: achenes, drupelets and a calyx outshine it, and a soft body's is weak. What the body moves
 as a whole does not: the change's root mean square over a window, above the background's, is high all over the contact,
 between achenes too, and its noise falls with the window. The region is the star-shaped one that gains most, where a
-place gains by how far its level, clipped at what most of the region reaches, lies above a share of that.
+place gains its level, clipped at what most of the region reaches, less a share of that.
 Rays are drawn in coordinates in which the region is as wide as it is long, so that a long body has a region as well.
 """
 
@@ -125,7 +125,7 @@ def find_region(
         texture: whether it is textured where that is known.
 
     Returns:
-        The region, or None where nothing stands out of the background.
+        The region, or None where nothing exceeds the background.
     """
     p = constants
     shape = (start.shape[0], start.shape[1])
@@ -328,7 +328,7 @@ def _drawn(rays: Rays, radii: _Floats, every: int, shape: tuple[int, int]) -> Ma
 
 
 def _inner_hull(region: Mask, share: float) -> Mask:
-    """The inner part of a region's convex hull: a flat centre lies there, be its ring closed or not."""
+    """The inner part of a region's convex hull: it contains a flat centre, be its ring closed or not."""
     outlines, _ = cv2.findContours(region, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     hull = cv2.convexHull(np.concatenate(outlines))[:, 0].astype(np.float64)
     moments = cv2.moments(hull.astype(np.float32))

@@ -12,7 +12,7 @@ TYPICAL_UNCERTAINTY = 0.15
 """Relative, of a length: covers the published units and the field's distortion; an area is good to about 30 %."""
 
 TYPICAL_STANDARD_UNCERTAINTY = TYPICAL_UNCERTAINTY / sqrt(3)
-"""Its standard uncertainty: a unit's own lies anywhere in the published range alike (GUM 4.3.7)."""
+"""Its standard uncertainty: a rectangular distribution of the units' scales over the published range (GUM 4.3.7)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ parabola, and less what the reference turns into with a gain or a shift, is left
 is correlated with the slopes of a small round dent, in both directions and each colour, and counted in units of its own
 spread over the frame, the colours' common noise taken apart (a matched filter; S. M. Kay, Fundamentals of Statistical
 Signal Processing, volume 2, sections 4.3 and 4.4). Of noise the root of the sum of the six squares nearly follows the
-chi distribution with six degrees of freedom, whatever the sensor's noise.
+chi distribution with six degrees of freedom, independent of the sensor's noise.
 """
 
 from typing import NamedTuple

@@ -79,7 +79,7 @@ def marked_fruit(press: Press, recipe: Recipe, closing_mm: float, *, good: bool,
     A press that the judge rejects for other reasons than a limit is diverted by every limit. A fruit whose steps the
     judge ended before has at least the measured area; leaving out the worst of the bad fruit would be wrong. Of these,
     a good one counts as diverted, a bad one as passed by any larger limit, the less favourable case, unless an earlier
-    limit or the growth, which the draft keeps, has proven it damaged or lets it pass no more.
+    limit or the growth, unchanged in the draft, has proven it damaged or lets it pass no more.
 
     Args:
         recipe: that it was pressed by, whose early stop may have ended its steps.

@@ -53,7 +53,7 @@ class Page:
     title: str
     facts: Sequence[tuple[str, str]]
     changes: Sequence[Difference] | str
-    """What the draft changes of the recipe of all fruit; in words why it is not known."""
+    """What the draft changes of the recipe of all fruit, or a text with the reason why it is not known."""
     counted: Counted
     against: Compared | None
     """Comparison with people's marks; None if no fruit is marked."""

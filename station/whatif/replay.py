@@ -1,7 +1,7 @@
 """Replay of a stored inspection by a draft; a result that cannot be known is reported as unknown.
 
 A stored curve ends where the inspection's own recipe ended it. A draft that would have continued has only the verdicts
-that are certain at that point: proven damage, and a fruit that cannot pass any more, whatever would have followed.
+that are certain at that point: proven damage, and a fruit that no further step could let pass.
 """
 
 import json

@@ -10,7 +10,7 @@ CHOSEN = "station IN (${station:sqlstring}) AND fruit IN (${fruit:sqlstring}) AN
 HERE = f"{BETWEEN} AND {CHOSEN}"
 ALL = "sum(inspections)"
 DAY = "date_trunc('day', hour, '$__timezone')"
-"""The reader's day: in the time zone in which Grafana shows it, whatever the database's is."""
+"""The reader's day: in the time zone in which Grafana shows it, independent of the database's."""
 FAILED = (
     "coalesce(sum(inspections) FILTER (WHERE outcome = 'FAIL'), 0)::float "
     "/ nullif(sum(inspections) FILTER (WHERE outcome <> 'NO_RESULT'), 0)"

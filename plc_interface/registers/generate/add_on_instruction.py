@@ -3,8 +3,8 @@
 The logic is that of the Structured Text, in the form of Rockwell's "Logix 5000 Controllers Structured Text"
 (1756-PM007) and "Logix 5000 Controllers Import/Export" (1756-RM084): numbers are DINT, a 16-bit word is made
 unsigned by a mask, a structure or a word is copied by COP, and the timer is TONR. COP copies the low word first, so the
-station's `modbus.word_order` has to be `low_first`. A Logix controller keeps all tags over PROG; its prescan, which
-precedes the first scan, runs the routine `Prescan`.
+station's `modbus.word_order` has to be `low_first`. A Logix controller retains all tags over PROG; its prescan,
+which precedes the first scan, runs the routine `Prescan`.
 """
 
 import re
@@ -106,7 +106,7 @@ def _milliseconds(literal: str) -> int:
 
 
 def _data_types(types: ET.Element) -> None:
-    """The structures; Logix keeps eight flags in a hidden byte."""
+    """The structures; Logix stores eight flags in a hidden byte."""
     for name, registers in STRUCTURES.items():
         made = ET.SubElement(types, "DataType", Name=name, Family="NoFamily", Class="User")
         listed, flags = ET.SubElement(made, "Members"), 0

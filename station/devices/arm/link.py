@@ -86,7 +86,7 @@ class ArmLink:
 
     @property
     def lost(self) -> ArmFault | None:
-        """Return why the arm's state is unknown; None if the link is up, whatever else waits for a person."""
+        """Return why the arm's state is unknown; None if the link is up, also with a fault that waits for a person."""
         return self._lost
 
     @property
@@ -196,7 +196,7 @@ class ArmLink:
             await self._heard(process)
 
     async def _state(self, process: ArmProcess, deadline_s: float) -> Snapshot:
-        """Read the state, whatever its age; ur-rtde has a last one also of a connection that is cut."""
+        """Read the state, of any age: ur-rtde returns the last one also for a connection that is cut."""
         snapshot = await process.request(self._beat_message(), Snapshot, deadline_s=deadline_s)
         if not snapshot.connected:
             raise ArmFault(ArmCause.LINK_LOST, messages.LINK_CUT())

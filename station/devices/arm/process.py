@@ -187,8 +187,8 @@ class UrRtdeProcess:
     def _late(self) -> bool:
         """Return whether the watchdog may have stopped a program that was playing when last read.
 
-        The limit counts from a kick's begin, which the controller cannot have received before: so whatever it stops,
-        however long this process was kept from the processor meanwhile, was late.
+        The limit counts from the start of a kick, before which the controller cannot have received it. So every stop
+        by the watchdog counts as late, however long this process waited for the processor meanwhile.
         """
         return self._played and time.monotonic() - self._kicked_s > 1.0 / self._set_up.watchdog_hz
 

@@ -5,7 +5,7 @@ from typing import cast
 
 
 class Connection(asyncio.BufferedProtocol):
-    """A client's TCP connection, from `connect`. It takes from the network only what is asked for."""
+    """A client's TCP connection, from `connect`. It reads from the network only what its caller requests."""
 
     def __init__(self) -> None:
         loop = asyncio.get_running_loop()
@@ -52,7 +52,7 @@ class Connection(asyncio.BufferedProtocol):
         self._transport.pause_reading()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Have whoever waits raise."""
+        """Make a waiting `fill` raise."""
         self._lost.set_result(exc or EOFError())
         if not self._filled.done():
             self._filled.set_exception(self._lost.result())

@@ -135,7 +135,7 @@ def captured_at_s(capture: Capture, now_s: float) -> float:
     """Return the monotonic time of the frame that was just read.
 
     OpenCV's V4L2 capture gives the kernel's time of the buffer as the position in ms: for uvcvideo on the monotonic
-    clock, when the frame began to come in; a frame of VGA is read some 30 to 60 ms later. Its exposure may have begun
+    clock, when the frame began to come in; a frame of VGA is read some 30 to 60 ms later. Its exposure may have started
     up to a frame's period before. Where the time is of another clock, the time of reading is taken. Unverified on
     hardware.
     """

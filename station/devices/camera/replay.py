@@ -59,7 +59,7 @@ class ReplayCamera:
             self._playing = asyncio.create_task(self._play(1.0 / self._settings.replay.frames_per_s), name="replay")
 
     async def frame(self, newer_than_s: float, deadline_s: float) -> Frame:
-        """See `Camera.frame`; without a rate each call after the first gives the next frame, whatever `newer_than_s`.
+        """See `Camera.frame`; without a rate each call after the first gives the next frame and ignores `newer_than_s`.
 
         Raises:
             NoFrameError: no such frame came in time, or the recording has ended.

@@ -62,7 +62,7 @@ class Inspector:
         """Set when a measured step lets another one be made."""
 
     async def open_jaws(self) -> Event:
-        """Let go of whatever is held."""
+        """Open the jaws and release what they hold."""
         await open_freely(self._devices.cell.gripper)
         return Event.JAWS_OPEN
 
@@ -190,7 +190,7 @@ class Inspector:
     async def _backed_off(
         self, now: Inspection, rig: DeviceRig, met: Met, at: Position
     ) -> tuple[Position, Offset | None]:
-        """Open to where nothing touched, and say how far the first contact of the sweep was off the field's middle.
+        """Open to where nothing touched, and return how far the sweep's first contact was off the field's middle.
 
         The way is None where there was no contact any more; the fingers came to rest at `at`.
         """
@@ -268,7 +268,7 @@ class Inspector:
         return now.active.recipe.steps.measured == "while_closing" and not now.closed_steps
 
     async def _close_on(self, now: Inspection) -> None:
-        """Close without a stop to the last damage threshold that has to be kept, measuring each frame on the way.
+        """Close without a stop to the last damage threshold that has to be met, measuring each frame on the way.
 
         The fingers stop sooner where an area ends the steps.
         """

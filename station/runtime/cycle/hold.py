@@ -34,7 +34,7 @@ class Hold:
         return self.event is not before
 
     async def store(self) -> None:
-        """Make the hold durable. A disk that refuses or hangs is logged, and keeps nobody waiting for long."""
+        """Make the hold durable. A disk that refuses or hangs is logged; the wait for it is short."""
         storing = asyncio.create_task(self._store(), name="hold's file")
         await asyncio.wait({storing}, timeout=_DEADLINE_S)
         if not storing.done():

@@ -30,7 +30,7 @@ class Inspection:
     limits: Deadlines
     mm_per_px: float
     calibration: str
-    """In words, for the record."""
+    """As text, for the record."""
     scale_uncertainty: float
     """Relative standard uncertainty of `mm_per_px`."""
     resolution_mm: float
@@ -105,7 +105,7 @@ class Inspection:
 
     @property
     def presses_made(self) -> int:
-        """Number of presses begun, the present one counted."""
+        """Number of presses so far, the present one counted."""
         return 1 + len(self.earlier)
 
     @property
@@ -128,7 +128,7 @@ class Inspection:
         self.let_go(self.onset_mm, self.before_onset_mm)
 
     def let_go(self, met_mm: float | None, clear_mm: float | None) -> None:
-        """Begin another closing: what this one has shown is done with.
+        """Begin another closing: the steps of this one are discarded.
 
         Args:
             met_mm: the width at which this closing met the fruit.
@@ -139,7 +139,7 @@ class Inspection:
         self.seen.clear()
 
     def forget_pictures(self) -> None:
-        """Let go of the frames, which are in the records by now or never will be."""
+        """Release the frames, which are in the records by now or never will be."""
         self.steps.clear()
         self.seen.clear()
         self.reference_image = None

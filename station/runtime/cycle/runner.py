@@ -89,7 +89,7 @@ class Performer(Protocol):
         """An event came that the table does not list; nothing was done."""
 
     def tick(self) -> None:
-        """Called about ten times a second, and after every event: whatever depends on time alone."""
+        """Perform what depends on time alone. Called about ten times a second, and after every event."""
 
 
 class CycleRunner:

@@ -20,7 +20,7 @@ MEETING_S = 15.0
 log = logging.getLogger(__name__)
 
 Check = Callable[[], Awaitable[None]]
-"""Checks the device; raises its fault. It returns in time, whatever the device does. Any other error is a fault too."""
+"""Checks the device; raises its fault. It returns in time in any case. Any other error is a fault too."""
 
 
 class NoAnswerYetError(StationError):
@@ -33,7 +33,7 @@ class DeviceMonitor:
     Args:
         name: of the device, as in the log; its title is what a person reads.
         on_change: gets the fault from now on, None for no fault.
-        on_progress: called after each check, whatever its result.
+        on_progress: called after each check, with any result.
     """
 
     def __init__(

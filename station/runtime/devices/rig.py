@@ -212,7 +212,7 @@ def _read(reading: GripperReading, requested_mm: float | None = None) -> Positio
 
 
 def _combined(after: Message | None, reason: Message, alone: Definition, with_same_reason: Definition) -> Message:
-    """Return what kept the station from letting go, with what failed before; a reason of both appears once."""
+    """Return why the station could not release, with what failed before; a reason of both appears once."""
     if after is None:
         return alone(reason=reason)
     if after == reason:
@@ -221,7 +221,7 @@ def _combined(after: Message | None, reason: Message, alone: Definition, with_sa
 
 
 async def at_once(*works: Coroutine[None, None, T]) -> list[T]:
-    """Do several things, not begun yet, at once; if one fails the others are cancelled, and its error is raised.
+    """Run several coroutines, not started yet, at once; if one fails the others are cancelled, and its error is raised.
 
     Returns:
         Their results, in their order.

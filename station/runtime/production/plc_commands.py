@@ -75,7 +75,8 @@ class PlcCommands:
     def restore(self) -> None:
         """Restore after a restart a person's stop, which lasts until a reset, and the mode.
 
-        Somebody may reach into the cell of a station whose files say neither the one nor the other, or cannot be read.
+        A file that cannot be read, or has an unknown value, counts as a stop or as manual mode: a person may reach into
+        the cell.
         """
         files = self._state_files
         if not (files.is_missing(_STOPPED) or files.read(_STOPPED) == b"no"):
@@ -296,7 +297,7 @@ class PlcCommands:
         return await self._until_ready()
 
     def _later_stop(self, ordered_s: float, *, program_stopped: bool) -> Message | None:
-        """Return what asks for a person since a reset was ordered, who cannot have confirmed it; None for nothing.
+        """Return what has required a person since a reset was ordered, and is not confirmed by it; None for nothing.
 
         Args:
             ordered_s: monotonic time of the reset.
@@ -308,7 +309,7 @@ class PlcCommands:
         return self._activity() if latched or stopped else None
 
     async def _until_ready(self) -> Message | None:
-        """Wait for what a reset has begun; return why the station is not ready."""
+        """Wait for what a reset has started; return why the station is not ready."""
         service, tried_s = self._service, time.monotonic()
         reached = await service.runner.until(
             lambda now: (

@@ -267,7 +267,7 @@ class PanelCalibration:
         return joined(failed) if failed else None
 
     async def _put_in_force(self, entry: AuditEntry, prepare: Callable[[], Prepared]) -> None:
-        """Put a record in force together with its audit entry; once begun it comes to its end, also when called off.
+        """Put a record in force together with its audit entry; once started it completes, also when cancelled.
 
         Raises:
             StationError: neither is stored.

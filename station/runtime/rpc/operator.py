@@ -69,7 +69,7 @@ class PanelServer:
         self._inspections = RecentInspections(partial(read_counts, records.folder))
         self._heard_s: float | None = None
         self.flooded_by = ""
-        """The address that floods the pages, as their process said last; empty for none."""
+        """The address that floods the pages, as their process last reported it; empty for none."""
         self._service.registry.listen(self._inspections.add)
         self._service.listen(self._inspections.set_outcome)
         self.handlers: Handlers = {

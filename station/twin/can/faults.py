@@ -8,7 +8,7 @@ The common faults mean here, with the board's amount:
 | intermittent | off for every second half of a period | the period, s |
 | stuck | the encoder sends the same count for ever | none |
 | garbage | frames too short for what they are, beside the right ones | none |
-| wrong | the gate reports shots under another sequence | none |
+| wrong | the gate reports actuations under another sequence | none |
 | slow | the belt at its speed divided by (1 + amount) | times, at most 1000 |
 | delayed | the gate's reports come late | s, at most 60 |
 """
@@ -26,7 +26,7 @@ class LineFault(StrEnum):
     ENCODER_SILENT = "encoder_silent"
     """The encoder neither sends nor hears."""
     WRONG_IDENTITY = "wrong_identity"
-    """The gate says that it is another product."""
+    """The gate reports that it is another product."""
     MAPPING_REFUSED = "mapping_refused"
     """The gate aborts every write to a PDO mapping."""
     MAPPING_CHANGED = "mapping_changed"
@@ -38,7 +38,7 @@ class LineFault(StrEnum):
     OVERLOAD = "overload"
     """Emergency 0x2310 until it is switched off, then the error reset."""
     BUS_OFF = "bus_off"
-    """Once, when it is switched on: the station's driver is told that its controller left the bus."""
+    """Once, when it is switched on: the station's driver gets the report that its controller left the bus."""
 
 
 def line_faults() -> FaultBoard:

@@ -56,7 +56,7 @@ class LineNodes:
             node.network.close()
 
     def state(self) -> dict[str, Any]:
-        """Count, open flaps and latest shots, for the console."""
+        """Count, open flaps and latest actuations, for the console."""
         return {
             "count": self.encoder.count,
             "gate": self.gate.local.nmt.state.lower(),

@@ -84,7 +84,7 @@ class LoopNetwork(canopen.Network):
     def report_bus_off(self) -> None:
         """Let the others' drivers see what Linux reports when a controller leaves the bus (linux/can/error.h).
 
-        On a real bus each controller reports its own state; the simulated bus has none, so this frame stands for it.
+        On a real bus each controller reports its own state; the simulated bus has none, so this frame represents it.
         """
         if self.bus is not None:
             self.bus.send(can.Message(arbitration_id=0x40, is_error_frame=True, is_extended_id=False, dlc=8))

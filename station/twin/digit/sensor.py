@@ -54,7 +54,7 @@ class Condition:
 
 
 class DigitSensor:
-    """Draws frames. The clean image is kept until dent, condition or drift change; noise is new in each frame.
+    """Draws frames. The clean image is reused until dent, condition or drift change; noise is new in each frame.
 
     Args:
         seed: of the noise and the drift; the same calls give the same frames.

@@ -1,4 +1,4 @@
-"""The twin's DIGIT on the wire: 30 frames a second over TCP, drawn only while somebody watches."""
+"""The twin's DIGIT on the wire: 30 frames a second over TCP, drawn only while a client watches."""
 
 import asyncio
 import contextlib
@@ -68,7 +68,7 @@ class _Captured:
 
 
 class DigitCameraServer:
-    """Serves one sensor's frames to any number of clients; a slow client misses frames and delays nobody.
+    """Serves one sensor's frames to any number of clients; a slow client misses frames and delays no other.
 
     Args:
         world: what the gel feels.
@@ -268,7 +268,7 @@ class DigitCameraServer:
                 self._watching.clear()
 
     def _due(self, sent: int) -> _Captured | None:
-        """The newest frame beyond the last one sent that is as old as `delayed` asks for."""
+        """The newest frame beyond the last one sent that is as old as `delayed` requires."""
         latest_s = self._clock.now_s() - self.faults.amount(CommonFault.DELAYED)
         due = (one for one in reversed(self._frames.values()) if one.captured_s <= latest_s)
         newest = next(due, None)

@@ -12,7 +12,7 @@ def spoiled(image: Image, faults: FaultBoard, sequence: int) -> Image:
     """The frame as the faults leave it.
 
     The sensor reads out landscape rows, which are the portrait image's columns: a tear runs down the image with
-    what lies beyond it displaced along the columns, and a lost beginning rolls the whole image.
+    what is beyond it displaced along the columns, and a lost beginning rolls the whole image.
 
     Args:
         image: shape (640, 480, 3), dtype uint8.

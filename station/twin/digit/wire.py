@@ -1,8 +1,8 @@
 """The twin camera's messages: a 4-byte big-endian length, a JSON header of that length, then the payload's bytes.
 
-A header names its `kind`; `bytes` in it is the payload's length. The client asks with a header alone:
+A header names its `kind`; `bytes` in it is the payload's length. The client's request is a header alone:
 
-| asked | answered |
+| request | answer |
 |---|---|
 | `{"kind": "stream"}` | a `frame` for each frame from now on, until the connection closes |
 | `{"kind": "leds", "red": 0..15, "green": 0..15, "blue": 0..15}` | `leds`, the same values |

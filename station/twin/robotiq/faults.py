@@ -40,7 +40,7 @@ class GripperFault(StrEnum):
     """The gripper's own faults."""
 
     OBJECT_DROPPED = "object_dropped"
-    """Whatever is between the fingers falls out and stays out."""
+    """What is between the fingers falls out and stays out."""
     OVER_TEMPERATURE = "over_temperature"
     """gFLT 8 and no motion, until it is switched off."""
     NO_COMMUNICATION = "no_communication"

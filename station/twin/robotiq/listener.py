@@ -26,7 +26,7 @@ class Listener(ABC):
     def __init__(self, gripper: RobotiqGripper, host: str = "127.0.0.1", port: int = 0) -> None:
         self.host = host
         self.port = port
-        """The port listened on; where 0 was asked for, the one that was found at `start`."""
+        """The port listened on; where 0 was given, the one that was found at `start`."""
         self._gripper = gripper
         self._server: asyncio.Server | None = None
         self._watcher: asyncio.Task[None] | None = None

@@ -23,7 +23,7 @@ from station.twin.robotiq.registers import COMMAND_ADDRESS, REGISTERS, STATUS_AD
 
 _SLOWEST = 1000.0
 _PROBE_MM = 0.1
-"""The load is asked at least this often along the travel."""
+"""The load is computed at least this often along the travel."""
 _CONTACT_MM = 0.001
 """How closely the place of first contact is found."""
 _ACTIVATION_FORCE_N = 40.0
@@ -97,7 +97,7 @@ class RobotiqGripper:
         )
 
     def write(self, command: Command) -> None:
-        """Take a command; gOBJ is cleared before this returns where it asks for another motion."""
+        """Take a command; gOBJ is cleared before this returns where it requests another motion."""
         now_s = self.clock.now_s()
         self._advance(now_s)
         before = self._command
@@ -125,7 +125,7 @@ class RobotiqGripper:
         raise KeyError(address)
 
     def write_registers(self, address: int, values: list[int]) -> None:
-        """Write registers in one go; reserved ones are taken and forgotten.
+        """Write registers in one go; reserved ones are accepted and ignored.
 
         Raises:
             KeyError: not all of them are command registers.

@@ -12,7 +12,7 @@ RESTING: Joints = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 NO_OFFSET: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 SHORTEST_BRAKING_S = 1e-3
 REST_S = 0.05
-"""How long the arm stands before it counts as steady."""
+"""How long the arm is at rest before it counts as steady."""
 
 
 class Body:
@@ -59,7 +59,7 @@ class Body:
             self._rest()
 
     def move_joints(self, target: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> None:
-        """Begin a joint motion; joints that are slower than asked for slow the others down.
+        """Begin a joint motion; joints that are slower than requested slow the others down.
 
         Raises:
             UnreachableError: the target is out of the joints' range.

@@ -62,7 +62,7 @@ class UrController:
         local_mode: local control as long as it is on; script and primary connections drop.
         pendant_stop: switching it on stops the program.
         registers_in_use: a fieldbus holds input registers 0 to 23 against new clients.
-        silent: connections are taken, and nothing is ever said.
+        silent: connections are accepted, and nothing is ever sent.
         rtde_silent: the same on the RTDE port alone.
         link_cut: connections are cut and refused; the controller itself goes on.
         safety_fault: switching it on is the event; it stays until the safety system is restarted.

@@ -86,11 +86,11 @@ class Registers:
         self.written_at_s[name] = now_s
 
     def input_int(self, number: int) -> int:
-        """An integer input register; 0 where nobody wrote it."""
+        """An integer input register; 0 where it was never written."""
         return self.inputs.get(f"input_int_register_{number}", 0)
 
     def input_doubles(self, first: int, count: int) -> tuple[float, ...]:
-        """Neighbouring double input registers; 0.0 where nobody wrote them.
+        """Neighbouring double input registers; 0.0 where they were never written.
 
         Raises:
             ValueError: one of them is not a finite number.

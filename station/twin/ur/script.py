@@ -31,7 +31,7 @@ class RuntimeState(IntEnum):
 
 
 class ScriptEndError(Exception):
-    """The script ends by its own doing or by an error in it."""
+    """The script ends by itself or by an error in it."""
 
 
 class ControlScript:
