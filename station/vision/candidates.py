@@ -41,8 +41,8 @@ class Candidates(NamedTuple):
 def body_candidates(moved: Movement, threshold: float, constants: Constants) -> Candidates:
     """Find where one body may be: what has moved clear of the noise, or curves enough to reach the threshold.
 
-    A place has moved from half of the level that most curved places reach on; of a faint body, wherever it exceeds the
-    background's noise.
+    A place has moved where its level is a share of what most curved places reach; of a faint body, wherever it exceeds
+    the background's noise.
 
     Args:
         moved: from `region.movement`.

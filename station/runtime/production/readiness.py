@@ -79,7 +79,7 @@ class Interlock:
         )
 
     def _packml(self) -> PackmlState | None:
-        """Return the state's own; STOPPING while an orderly end is under way, also where something still runs."""
+        """Return the state's own; STOPPING while an orderly end waits for what still runs."""
         facts = STATES[self._service.state]
         return PackmlState.STOPPING if self._service.ending and not facts.may_exit else facts.packml
 
