@@ -73,6 +73,7 @@ def _checked(path: Path, data: bytes) -> list[str]:
     try:
         with warnings.catch_warnings(action="ignore"), PIL.Image.open(BytesIO(data), formats=FORMATS) as picture:
             _check_size(path, *picture.size)
+            # Decoded only for the error that a truncated file raises here.
             picture.load()
             conversions = [f"{_MODES[picture.mode]} turned into colour"] if picture.mode in _MODES else []
             if getattr(picture, "n_frames", 1) > 1:
@@ -119,6 +120,7 @@ def to_colour(path: Path, raw: np.ndarray) -> Decoded:
     """
     conversions: list[str] = []
     if raw.dtype == np.uint16:
+        # 65,535 is 257 times 255, so white stays white.
         raw = (raw // 257).astype(np.uint8)
         conversions.append("16 bits scaled to 8")
     if raw.dtype != np.uint8:

@@ -90,6 +90,7 @@ def measure_all(
         jobs: number of threads, 1 or more.
         stages: return the stages' pictures.
     """
+    # A method is for one thread's use, so each thread makes its own.
     local = threading.local()
 
     def get_method() -> Method:

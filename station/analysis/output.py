@@ -129,6 +129,7 @@ class OutputFolder:
         path = self.folder / "results.csv"
         try:
             if self._results is None:
+                # Without a buffer, so that a row is in the file once it is written, also where the program is killed.
                 self._results = path.open("xb", buffering=0)
                 _append_whole(self._results, _csv_bytes([RESULT_COLUMNS, row]))
             else:

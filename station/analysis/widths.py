@@ -57,6 +57,7 @@ def _text(path: Path) -> str:
     if len(data) > _LARGEST_FILE_BYTES:
         raise BadInputError(f"{path}: expected a table of widths of at most {_LARGEST_FILE_BYTES} bytes")
     try:
+        # Spreadsheets may begin a file with a byte order mark.
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise BadInputError(f"{path}: expected UTF-8; save the table as CSV UTF-8") from error

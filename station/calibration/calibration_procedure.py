@@ -92,6 +92,7 @@ class CalibrationProcedure:
         self._press = BallPress(rig, recipe)
         self._pressed: list[Step] = []
         self._checks: tuple[Check, ...] = ()
+        # In the constructor, so that such places are refused before anything moves.
         if any(hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) < _LEAST_WAY_MM for a, b in combinations(self._places, 2)):
             raise BadInputError(messages.PLACES_TOO_NEAR(least_mm=_LEAST_WAY_MM))
 
@@ -110,10 +111,12 @@ class CalibrationProcedure:
         try:
             measured = await self._measure()
             await self._rig.release()
+        # CancelledError is no Exception: a cancelled run opens the jaws, too.
         except BaseException:
             await self._press.let_go()
             raise
         self._say(messages.STEP_JUDGE, 1, 1)
+        # In a thread: the event loop renews the arm's lease meanwhile, without which the controller stops the arm.
         return await asyncio.to_thread(self._judge, measured)
 
     async def _measure(self) -> _Measured:
@@ -130,13 +133,16 @@ class CalibrationProcedure:
         if max(await asyncio.to_thread(lambda: figures.pixel_noise(frames).mean(axis=(0, 1)))) == 0:
             raise RefusedError(messages.FRAMES_EQUAL())
         some = taken.frames[:: max(1, len(frames) // _GATE_FRAMES)]
+        # Each by itself: the mean of all frames would hide the noise that the few frames of a step have.
         untouched = [(await self._press.measure(replace(taken, frames=(frame,)))).contact for frame in some]
         steps = await self._press_through()
+        # There is one, and a step before it: `_press_through` refuses a press without a contact or with one at first.
         first = next(step for step in steps if step.contact.is_firm)
         before = [step for step in steps if step.width_mm > first.width_mm]
         between = messages.ONSET_BETWEEN(wider_mm=before[-1].width_mm, narrower_mm=first.width_mm)
         self._say(messages.STEP_ONSET, 1, 1, between)
         onset_mm = await self._press.fine_onset(before[-1].width_mm, first.width_mm)
+        # With the steps before the contact: the frames hardly show the light's drift, as the reference is their median.
         noise = await asyncio.to_thread(figures.noise, frames, [*untouched, *(step.contact for step in before)])
         return _Measured(reference, frames, steps, onset_mm, noise, await self._at_places(onset_mm))
 
@@ -149,6 +155,7 @@ class CalibrationProcedure:
             steps.append(step)
             self._pressed.append(step)
             self._say(messages.STEP_PRESS, number + 1, plan.number + 1, step.message)
+            # Refused before the next step, so that what touches already is not pressed further.
             if number == 0 and step.contact.is_firm:
                 met_mm = self._settings.ball_mm + self._settings.holder_mm
                 raise RefusedError(
@@ -163,14 +170,17 @@ class CalibrationProcedure:
             return []
         found: list[PlacePoint] = []
         for number, place in enumerate(self._places):
+            # The first place has the ball and a reference already.
             if number:
                 await self._rig.release()
                 await self._rig.lay(place)
+                # The light drifts while a person moves the ball.
                 await self._press.take_reference(self._recipe.imaging.reference_frames)
             step = await self._press.step(onset_mm - _PLACES_CLOSING_MM)
             self._pressed.append(step)
             contact = step.contact
             where = messages.PLACE(number=number + 1, x_mm=place.x_mm, y_mm=place.y_mm)
+            # The centroid of a contact that is cut or not round is not the ball's middle: distances from it are wrong.
             if contact.centroid_px is None or step.point.cut or figures.roundness(contact) > ROUNDEST:
                 raise RefusedError(messages.PLACE_UNSEEN(place=where, width_mm=step.width_mm))
             x_px, y_px = contact.centroid_px
@@ -196,6 +206,7 @@ class CalibrationProcedure:
         height, width = reference.shape[:2]
         usual = Scale.typical(height, width)
         made = datetime.now(UTC)
+        # Stored before the refusal below, whose evidence has the checks too.
         checks = self._checks = tuple(calibration_checks(self._settings, self._recipe, steps, onset_mm, noise, scale))
         calibration = Calibration(
             id=stamp(made),

@@ -41,7 +41,9 @@ def calibration_checks(
     shown = {point.width_mm for point in curve}
     touched = [step for step in steps if step.point.width_mm in shown and step.contact.found]
     fall = figures.falls(curve)
+    # Without a contact both are 0, which fails their checks.
     round_ = max((figures.roundness(step.contact) for step in touched), default=0.0)
+    # A confidence that the method does not give is no trust, as for the judge.
     confidence = min((point.confidence or 0.0 for point in curve), default=0.0)
     checks = [
         Check(
@@ -83,6 +85,7 @@ def calibration_checks(
             name="noise",
             passed=noise.gate_factor <= _MOST_GATE_FACTOR,
             found=messages.GATE_REACHED(value=noise.gate),
+            # The factor's limit as one of the statistic, which is the value found.
             expected=messages.AT_MOST(value=QUIET_GATE * _MOST_GATE_FACTOR),
             remedy=messages.DO_NOISE(),
         ),
@@ -92,6 +95,7 @@ def calibration_checks(
         checks.append(
             Check(
                 name="scale",
+                # A measured scale that is no surer than the typical one gains nothing.
                 passed=low <= scale.mm_per_px <= high and scale.uncertainty < TYPICAL_UNCERTAINTY,
                 found=messages.SCALE_FOUND(scale_mm=scale.mm_per_px, percent=100 * scale.uncertainty),
                 expected=messages.SCALE_EXPECTED(least_mm=low, most_mm=high),
@@ -110,7 +114,9 @@ def verification_checks(
 ) -> list[Check]:
     """Check a verification, its curve in order of closing; `onset_mm` is None if nothing was touched."""
     area = figures.ratio(curve, calibration.curve, "area_px")
+    # The widths before the contact have no area, which is no fall; a contact that is lost again is one.
     fall = figures.falls(list(dropwhile(lambda point: not point.area_px, curve)))
+    # No sensor's noise is less than 0.1 grey levels, but a dark colour's may be stored as 0.
     noise = max(now / max(was, 0.1) for now, was in zip(pixel_levels, calibration.noise.pixel_levels, strict=True))
     shift_mm = None if onset_mm is None else onset_mm - calibration.onset_mm
     return [
@@ -132,6 +138,7 @@ def verification_checks(
         ),
         Check(
             name="rising",
+            # A curve without a contact does not fall either.
             passed=fall is None and area is not None,
             found=_fallen(*fall) if fall else messages.NO_AREA() if area is None else messages.AREA_RISES(),
             expected=messages.RISE_EXPECTED(),

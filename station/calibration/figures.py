@@ -26,6 +26,7 @@ def noise(frames: Sequence[Image], untouched: Sequence[Contact]) -> Noise:
     return Noise(
         pixel_levels=_by_colour(pixel_noise(frames).mean(axis=(0, 1))),
         gate=round(gate, 3),
+        # At least 1: a quiet unit does not become more sensitive than what was tested.
         gate_factor=round(max(1.0, gate / QUIET_GATE), 3),
         drift_levels=round(max((contact.drift_levels or 0.0 for contact in untouched), default=0.0), 2),
     )
@@ -37,6 +38,8 @@ def pixel_noise(frames: Sequence[Image]) -> np.ndarray:
     Returns:
         Shape (height, width, 3), dtype float32, grey levels.
     """
+    # Sums of differences to the first frame: those of whole grey levels would be so large that float32 loses the
+    # small variance between the two.
     total, squares = (np.zeros(frames[0].shape, np.float32) for _ in range(2))
     first = frames[0].astype(np.float32)
     for frame in frames:
@@ -45,6 +48,7 @@ def pixel_noise(frames: Sequence[Image]) -> np.ndarray:
         total += level
         squares += level**2
     number = len(frames)
+    # Rounding may leave a variance slightly below 0.
     return np.sqrt(np.maximum(0.0, (squares - total**2 / number) / (number - 1)))
 
 
@@ -81,10 +85,13 @@ def scale_of(places: Sequence[PlacePoint], tolerance_mm: float) -> MeasuredScale
         ways_px.append(
             float(np.hypot(one.centroid_x_px - other.centroid_x_px, one.centroid_y_px - other.centroid_y_px))
         )
+    # Contacts that coincide must not divide by 0; the scale that they give is refused by the checks.
     mm, px = np.asarray(ways_mm), np.maximum(np.asarray(ways_px), 1e-6)
+    # Least squares through the origin: the longer distances, which are relatively surer, weigh more.
     mm_per_px = float(mm @ px / (px @ px))
     disagreement = 2 * float(np.sqrt(np.mean((mm - mm_per_px * px) ** 2))) / float(mm.mean())
     known = tolerance_mm / float(mm.mean())
+    # A distance has the noise of two centroids.
     seen = _CENTROID_PX * float(np.sqrt(2.0)) / float(px.mean())
     return MeasuredScale(mm_per_px, float(np.sqrt(disagreement**2 + known**2 + seen**2)))
 
@@ -119,6 +126,7 @@ def ratio(
         for point in curve
         if point.area_px and widths[0] - _STEP_MM <= point.width_mm <= widths[-1] + _STEP_MM
     ]
+    # The median, so that one wrong step of the few does not decide.
     return round(float(np.median(ratios)), 4) if ratios else None
 
 
@@ -129,6 +137,7 @@ def roundness(contact: Contact) -> float:
         return 0.0
     spread = np.array([[moments["mu20"], moments["mu11"]], [moments["mu11"], moments["mu02"]]])
     shorter, longer = np.linalg.eigvalsh(spread)
+    # The spread goes with the square of an axis; across a contact one pixel wide there is none.
     return float(np.sqrt(longer / max(shorter, 1e-9)))
 
 

@@ -9,6 +9,7 @@ def gated(segmentation: Segmentation, factor: float) -> Segmentation:
         return segmentation
     robust = segmentation.robust
     raised = {
+        # `model_copy` does not validate, so the fields' bounds are enforced here.
         "gate_ratio": min(LARGEST_GATE_RATIO, factor * robust.gate_ratio),
         "least_bend": min(LARGEST_LEAST_BEND, factor * robust.least_bend),
     }

@@ -73,6 +73,7 @@ def examine(image: Image, golden: Image | None, least_light: float) -> list[Find
         golden: the same gel when it was sound, of the same shape; None if there is none.
         least_light: smallest ratio of each colour to the golden picture.
     """
+    # Lost light and fog change the whole image: nothing finer can be judged beside them, so each is returned alone.
     lost = _lost_light(image, golden, least_light)
     if lost:
         return lost
@@ -98,6 +99,8 @@ def _named(image: Image, name: str) -> Image:
 
 def _lost_light(image: Image, golden: Image | None, least_light: float) -> list[Finding]:
     now = light(image)
+    # Without an earlier picture the colours are compared with each other: one dead LED does not move their median.
+    # Units differ in their light, so only a dead LED is certain then, and no dimmed one.
     before = (float(np.median(now)),) * 3 if golden is None else light(golden)
     limit = DEAD_LED if golden is None else least_light
     shares = [(level / max(was, 1.0), colour) for level, was, colour in zip(now, before, _LED_COLOURS, strict=True)]
@@ -143,6 +146,7 @@ def _regions(image: Image, golden: Image | None, scale: float) -> tuple[Mask, Ma
         if area < smallest * scale**2:
             continue
         length = float(np.hypot(width, height))
+        # The mean width is area / length, so length² / area is the length over it.
         is_tear = length > _TEAR_LENGTH * image.shape[1] and length**2 / area > _TEAR_SLENDERNESS
         (thin if is_tear else compact)[labels == label] = 255
     return compact, thin

@@ -74,6 +74,7 @@ class BallPress:
 
     async def let_go(self) -> None:
         """Open the jaws after a failure, whose cause matters more than their own; to the end, also when called off."""
+        # `asyncio.wait` does not cancel what it waits for, so a further cancellation does not interrupt the opening.
         releasing = asyncio.create_task(self._rig.release(), name="letting go of the ball")
         while not releasing.done():
             with contextlib.suppress(asyncio.CancelledError):
@@ -95,6 +96,7 @@ class BallPress:
         """Measure a step by itself."""
         if self._measurement is None:
             raise RuntimeError("a press is measured before its reference was taken")
+        # In a thread: the event loop renews the arm's lease meanwhile, without which the controller stops the arm.
         return await asyncio.to_thread(self._measurement.measure, step)
 
     async def step(self, width_mm: float) -> Step:
@@ -114,7 +116,9 @@ def contrast(image: Image, reference: Image, contact: Contact) -> float:
     if not contact.found or contact.centroid_px is None:
         return 0.0
     change = image.astype(np.float32) - reference
+    # The light's own change since the reference: a contact over less than half of the field does not move the median.
     change -= np.median(change[::4, ::4], axis=(0, 1))
+    # The length over the colours: in their mean, opposite changes would cancel.
     length = np.linalg.norm(cv2.GaussianBlur(change, (0, 0), _CONTRAST_BLUR_PX), axis=2)
     around = np.zeros(image.shape[:2], np.uint8)
     radius = _ROOM * float(np.sqrt(contact.area_px / np.pi))

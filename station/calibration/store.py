@@ -121,13 +121,16 @@ class CalibrationStore:
         raise UnknownCalibrationError(messages.UNKNOWN(name=repr(name)))
 
     def _prepare(self, kind: str, serial: str, name: str, record: Stored, files: Mapping[str, bytes]) -> "Prepared":
+        # Validated as it names a folder: another text might lead out of the home folder.
         folder = self._home / kind / _SERIAL.validate_python(serial)
         unfinished: Path | None = None
         try:
             folder.mkdir(parents=True, exist_ok=True)
+            # A process that was killed left them.
             for left in folder.glob(f"{_UNFINISHED}*"):
                 shutil.rmtree(left, ignore_errors=True)
             unfinished = Path(tempfile.mkdtemp(dir=folder, prefix=_UNFINISHED))
+            # A folder of `mkdtemp` is readable for its user only.
             unfinished.chmod(0o755)
             for file, data in {**files, RECORDS[kind]: record.model_dump_json(indent=1).encode()}.items():
                 _write(unfinished / file, data)
@@ -141,6 +144,7 @@ class CalibrationStore:
     def _all(self, kind: str, serial: str, model: type[RecordT]) -> Iterator[RecordT]:
         with contextlib.suppress(ValidationError):
             folder = self._home / kind / _SERIAL.validate_python(serial)
+            # The names are times, so their order is that of time.
             for path in sorted(_folders(folder), reverse=True):
                 with contextlib.suppress(OSError, ValidationError):
                     _NAME.validate_python(path.name)
@@ -162,6 +166,7 @@ class Prepared:
         """
         try:
             self._unfinished.rename(self._folder)
+            # Before the sync: where that fails, `discard` takes the record back.
             self._in_force = True
             sync_folder(self._folder.parent)
         except OSError as error:
@@ -196,6 +201,7 @@ def _picture(path: Path) -> Image:
 
 def _folders(folder: Path) -> list[Path]:
     try:
+        # A name with a dot is that of an unfinished record.
         return [path for path in folder.iterdir() if path.is_dir() and not path.name.startswith(".")]
     except OSError:
         return []

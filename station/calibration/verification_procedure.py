@@ -68,6 +68,7 @@ class VerificationProcedure:
         try:
             verified = await self._run()
             await self._rig.release()
+        # CancelledError is no Exception: a cancelled run opens the jaws, too.
         except BaseException:
             await self._press.let_go()
             raise
@@ -84,6 +85,7 @@ class VerificationProcedure:
         curve = tuple(step.point for step in steps)
         blue, green, red = (float(level) for level in pixel_levels)
         checks = verification_checks(self._settings, self._calibration, curve, onset_mm, (blue, green, red))
+        # Without its light, or through fog, the ball changes the image less on a sound gel, too.
         if not any(finding.fault in {GelFault.LED, GelFault.FOG} for finding in findings):
             findings += self._worn(steps)
         pictures = {f"{finding.fault}.png": finding.picture for finding in findings}
@@ -112,9 +114,11 @@ class VerificationProcedure:
             steps.append(await self._press.step(width_mm))
             self._on_progress(Progress(number, len(widths), messages.STEP_PRESS(), steps[-1].message))
         touched = next((step for step in steps if step.contact.is_firm), None)
+        # A contact at the first width began at a wider one, from which there is no step to search.
         if touched is None or touched is steps[0]:
             return steps, None if touched is None else touched.width_mm
         before = max(step.width_mm for step in steps if step.width_mm > touched.width_mm)
+        # No further out than twice the tolerance, since the search goes count by count.
         from_mm = min(before, self._calibration.onset_mm + 2 * self._settings.onset_tolerance_mm)
         self._on_progress(Progress(1, 1, messages.STEP_ONSET(), messages.ONSET_FROM(width_mm=from_mm)))
         return steps, await self._press.fine_onset(max(from_mm, touched.width_mm), touched.width_mm)

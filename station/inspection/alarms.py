@@ -62,6 +62,7 @@ LIFE: dict[tuple[AlarmState, AlarmEvent], AlarmState] = {
     (N.RETURNED, E.RAISED): N.UNACKNOWLEDGED,
     (N.RETURNED, E.SHELVED): N.SHELVED_NORMAL,
     (N.SHELVED, E.RETURNED): N.SHELVED_NORMAL,
+    # Also if it was acknowledged before: it appears in the operator's list anew.
     (N.SHELVED, E.UNSHELVED): N.UNACKNOWLEDGED,
     (N.SHELVED_NORMAL, E.RAISED): N.SHELVED,
     (N.SHELVED_NORMAL, E.UNSHELVED): N.NORMAL,
@@ -150,6 +151,7 @@ class Alarms:
         """Its cause is gone; a chattering one stays until it has not come for a while (`tick`)."""
         was = self.get(alarm)
         if was.state in CAUSED and was.chatters(now_s):
+            # The first return counts: it is quiet since then, until it is raised again.
             return self._with(replace(was, quiet_since_s=was.quiet_since_s or now_s))
         return self._after(alarm, E.RETURNED)
 

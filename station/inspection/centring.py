@@ -26,6 +26,7 @@ NOT_MOVED = Offset()
 def off_middle(centroid_px: tuple[float, float], shape: tuple[int, ...], mm_per_px: float) -> Offset:
     """Return a contact's offset: its centroid, x and y in px, from the middle of an image, height and width in px."""
     (x_px, y_px), (height_px, width_px) = centroid_px, shape[:2]
+    # The centroid is counted from the middle of the upper left pixel, so the last pixel's middle is at the width - 1.
     return Offset(mm_per_px * (x_px - (width_px - 1) / 2), mm_per_px * (y_px - (height_px - 1) / 2))
 
 

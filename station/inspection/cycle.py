@@ -225,6 +225,7 @@ def _latched() -> Iterable[Row]:
         yield Row((*UNRECORDED, *GETTING_READY, S.RECOVERING), (event,), S.LATCHED, stopped)
         yield Row(ACCEPTING, (event,), S.LATCHED, (A.REFUSE_TRIGGER, *stopped))
         yield Row((S.UNKNOWN, S.STOPPED, S.IDLE, S.HELD, S.CARRIED), (event,), S.LATCHED, stopped)
+        # A further stop while one is active has an alarm of its own.
         yield Row((S.RECORDING_LATCHED, S.LATCHED), (event,), None, (raised,))
 
 
@@ -291,6 +292,7 @@ ROWS: tuple[Row, ...] = (
     Row((S.RECORDING_HELD,), (E.RECORDS_FAULT, E.INTERNAL_FAULT), S.OPENING_HELD, (A.OPEN_JAWS,)),
     Row((S.OPENING_HELD,), (E.JAWS_OPEN, E.GRIPPER_FAULT, E.INTERNAL_FAULT), S.HELD, _HOLD),
     Row((S.RELEASING, *LEAVING), (*MOTION_FAULTS, E.INTERNAL_FAULT), S.HELD, _HOLD),
+    # The fruit may still be between the jaws, anywhere on the way to its place: a person has to take it out.
     Row(PLACING, (*MOTION_FAULTS, E.INTERNAL_FAULT), S.CARRIED, (A.HALT, Raise(AlarmId.FRUIT_HELD))),
     # The outcome cannot be made durable: it is not published, and is closed as NO_RESULT once the records are back.
     Row(RECORDING, (E.RECORDS_FAULT, E.INTERNAL_FAULT), S.OPENING_UNRECORDED, (A.OPEN_JAWS,)),
@@ -352,6 +354,7 @@ def hold_after(event: Event, state: State, before: Event | None, *, carries: boo
     if state is S.CARRIED or (carries and state in PLACING):
         return E.FRUIT_HELD
     if state in STOPPED_FOR_A_PERSON:
+        # What else happens there, such as RECORDED, does not end the stop that was stored.
         return event if event in LATCHES else before
     return None
 

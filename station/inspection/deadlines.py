@@ -141,8 +141,10 @@ def _longest_path_s(recipe: Recipe, pace: Pace) -> float:
     """The time of a fruit that is centred and pressed as often as the recipe may, each time to its last limit."""
     speed_mm_s, step_mm = recipe.gripper.speed_mm_s, recipe.steps.step_mm
     capturing_s = recipe.imaging.frames_per_step / pace.frames_per_s
+    # The arm and the jaws move at once.
     approach_s = max(pace.arm_way_s, pace.stroke_mm / pace.opening_mm_s) + _RAMP_S
     expected = recipe.expected_width
+    # From around the largest fruit down to a step below the smallest one, where the approach ends (`stop.lowest_mm`).
     sweep_s = (min(expected.largest_mm, pace.stroke_mm) - expected.smallest_mm + step_mm) / speed_mm_s + _RAMP_S
     # Back to where nothing touches, then count by count with one frame each, and once more with all.
     glances = ceil(OVERSHOOT_MM / FINEST_STEP_MM) + 1
@@ -150,6 +152,7 @@ def _longest_path_s(recipe: Recipe, pace: Pace) -> float:
     steps = recipe.steps.number
     if recipe.steps.stop_when_decided:
         steps = min(steps, ceil(recipe.damage.area[-1].closing_mm / step_mm))
+    # A step is measured while the next one is made, so that the slower of both counts; the last two have no next one.
     step_s = max(step_mm / speed_mm_s + _RAMP_S + recipe.imaging.settle_s + capturing_s, pace.measure_s)
     press_s = steps * step_s + 2 * pace.measure_s
     # The jaws open beside the fruit, the sensor moves, and the jaws close again to where it was met.
@@ -187,6 +190,7 @@ def _expected(recipe: Recipe, pace: Pace) -> dict[State, float]:
     """Return each state's expected duration, s; a state that is not listed takes no time."""
     steps, imaging = recipe.steps, recipe.imaging
     without_stop_mm = recipe.damage.passing_closing_mm if steps.measured == "while_closing" else 0.0
+    # Closing without a stop is one motion, to the last limit that has to be met.
     moving_s = max(steps.step_mm, without_stop_mm) / recipe.gripper.speed_mm_s + _RAMP_S
     capturing_s = imaging.frames_per_step / pace.frames_per_s
     opening_s = pace.stroke_mm / _SLOWEST_OPENING_MM_S + _RAMP_S

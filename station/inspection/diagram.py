@@ -156,6 +156,7 @@ def _arrow(start: State, end: State, events: list[Event]) -> str:
     else:
         right = to_column > column
         x1, x2 = (x1 + WIDTH_PX / 2, x2 - WIDTH_PX / 2) if right else (x1 - WIDTH_PX / 2, x2 + WIDTH_PX / 2)
+        # Apart, so that arrows of both directions do not cover each other.
         shift = 9 if right else -9
         y1, y2 = y1 + shift, y2 + shift
         middle = (x1 + x2) / 2

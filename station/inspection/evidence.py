@@ -118,6 +118,7 @@ class Evidence:
         doubts = set(point.flags)
         if point.confidence is None or point.confidence < self._recipe.segmentation.robust.least_confidence:
             doubts.add(Flag.LOW_CONFIDENCE)
+        # The area of an undecided image is unknown and only given as 0.
         if point.area_mm2 == 0 and Flag.UNDECIDED not in doubts:
             doubts.add(Flag.NO_CONTACT)
         return frozenset(doubts)
@@ -127,6 +128,7 @@ class Evidence:
         """Judged points whose area does not fit a closing gripper."""
         areas = [point.area_mm2 for point in self.judged]
         least_noise = _LEAST_NOISE * self._recipe.damage.area[-1].area_mm2
+        # `wrong_frames` takes widths, which fall while the closing rises.
         widths = [-point.closing_mm for point in self.judged]
         return [self.judged[wrong.index] for wrong in wrong_frames(widths, areas, least_noise=least_noise)]
 
@@ -142,6 +144,7 @@ class Evidence:
         return self._budgets[closing_mm]
 
     def _with_uncertainty(self, closing_mm: float, area_mm2: float, scatter_mm2: float) -> tuple[float, float]:
+        # What steps of one closing differ by was seen, so the uncertainty is no less.
         return area_mm2, max(area_mm2 * self.budget_at(closing_mm).expanded, scatter_mm2)
 
     def _uncertainty_mm2(self, point: Measured) -> float:
@@ -219,6 +222,7 @@ class Evidence:
         slope = median(_slopes(window))
         middle_mm = sum(point.closing_mm for point in window) / len(window)
         spread_mm = sum((point.closing_mm - middle_mm) ** 2 for point in window) ** 0.5
+        # The largest, since the line's formula takes all points as equally uncertain.
         of_points = max(self._step_uncertainty_mm2(point) for point in window) / spread_mm
         of_scale = abs(slope) * self.budget_at(_WINDOW_MM).expanded_of("scale", "size")  # at any closing alike
         uncertainty = hypot(of_points, of_scale)
@@ -232,6 +236,7 @@ class Evidence:
 
 def _begins_at_mm(points: Sequence[Measured]) -> float | None:
     steps = _slopes(points)
+    # Medians, as for the growth: of four steps or more a single wrong one hardly moves them.
     slope = median(steps) if steps else 0.0
     return median(point.closing_mm - point.area_mm2 / slope for point in points) if slope > 0 else None
 

@@ -129,6 +129,7 @@ def judge(press: Press, recipe: Recipe) -> Judgement:
         outcome, findings = "NO_RESULT", case.void + findings
     else:
         outcome = "PASS"
+    # The deciding case may have one limit only; the results are given beside all of them.
     every_limit, evidence = sized_limits(press, recipe).recipe, case.evidence
     areas = tuple(_result(evidence, every_limit, closing_mm) for closing_mm in recipe.steps.result_closings_mm)
     recipe = case.limits.recipe
@@ -282,6 +283,7 @@ def _over_early_stop(evidence: Evidence, recipe: Recipe) -> Finding | None:
     points, limits = evidence.points, recipe.early_stop
     last, growth = points[-1], evidence.latest_growth
     at_mm = last.closing_mm
+    # The largest so far, since a step measured too small afterwards does not spare the fruit.
     over = max(points, key=lambda point: point.area_mm2)
     if over.area_mm2 > limits.area_mm2:
         why = messages.STOPPED_AREA(closing_mm=at_mm, area_mm2=over.area_mm2, limit_mm2=limits.area_mm2)
@@ -324,6 +326,7 @@ def _void(press: Press, limits: SizedLimits) -> Iterator[Finding]:
             yield Finding(Reason.NO_CONTACT, messages.NOTHING_TOUCHED())
         return
     if press.onset_uncertainty_mm is None:
+        # The fruit is wider than this image's width by an unknown way: neither its width nor its size can be checked.
         why = messages.TOUCHED_AT_FIRST(width_mm=press.onset_mm)
         yield Finding(Reason.OUT_OF_RANGE, why, press.onset_mm, None, 0.0)
         return

@@ -99,6 +99,7 @@ def _longest_run(values: npt.NDArray[np.float64], floors: npt.NDArray[np.float64
     run, end, least_after = list[int](), values.size, values.max()
     for length in range(int(np.flatnonzero(lowest < np.inf)[-1]), 0, -1):
         fitting = np.flatnonzero(ending[:end, length] <= least_after)
+        # The run's end as late as possible, as onset frames are the least certain; before it the earliest places.
         end = int(fitting[0] if run else fitting[-1])
         run.append(end)
         least_after = min(least_after, values[end])

@@ -69,15 +69,18 @@ def _of_weak_edges(point: Measured, other: Measured) -> Measured:
     if not doubts <= EXCUSABLE or Flag.LOW_CONFIDENCE not in point.flags & other.flags:
         return point
     one, two = point.confidence or 0.0, other.confidence or 0.0
+    # A confidence of 0 adds nothing, and the odds of two that are 1 have no sum.
     if not 0 < one * two < 1 or not point.area_mm2 * other.area_mm2:
         return point
     both = (one + two - 2 * one * two) / (1 - one * two)  # the odds added, as a confidence again
     spread = abs(point.area_mm2 - other.area_mm2) / (point.area_mm2 + other.area_mm2)
+    # A contact whose edge is weak is measured too small rather than too large.
     larger = max(point, other, key=lambda each: each.area_mm2)
     return replace(
         point,
         area_mm2=larger.area_mm2,
         area_px=larger.area_px,
         confidence=both / (1 + _PER_SPREAD * spread),
+        # The flags are each press's own; the judge doubts both together by their confidence alone.
         flags=frozenset[Flag](),
     )

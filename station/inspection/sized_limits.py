@@ -47,6 +47,7 @@ def sized_limits(press: Press, recipe: Recipe) -> SizedLimits:
     if length is not None:
         length_mm, uncertainty_mm = length
         factor = (length_mm / rule.reference_mm) ** rule.exponent
+        # The limit is a power of the length, so its relative uncertainty is the length's times the exponent.
         return SizedLimits(_scaled(recipe, factor), factor, length_mm, rule.exponent * uncertainty_mm / length_mm)
     if rule.without_size == "plain_limit":
         return SizedLimits(recipe, relative_uncertainty=rule.exponent * rule.spread, without_size=True)

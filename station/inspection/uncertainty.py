@@ -72,6 +72,7 @@ def budget_at(closing_mm: float, press: Press, limits: SizedLimits) -> Budget:
         Component("repeatability", rule.repeatability_at(closing_mm), "", 1.0),
         # The contact began anywhere between the last image without it and the first with it: rectangular. Limits are
         # found with onsets as late as others, so that its middle is in both.
+        # Where the onset's uncertainty is None the press is void, and its budget decides nothing.
         Component("onset", rectangular(press.onset_uncertainty_mm or 0.0), "mm", per_mm),
         Component("gripper", rectangular(press.resolution_mm), "mm", per_mm),
         # An area has the scale twice.

@@ -36,6 +36,7 @@ class PressMeasurement:
         if self._tracker is not None:
             self._tracker.prepare_next(image)
         else:
+            # With the image itself: while it is referenced no other one gets its `id`.
             self._known[id(image)] = image, self._method.measure(image, firm_only=True)
 
     def seek(self, step: Step) -> MeasuredStep:

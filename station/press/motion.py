@@ -56,6 +56,7 @@ async def sweep(rig: MovingRig, recipe: Recipe, measure: Measure) -> Met:
     moving: asyncio.Future[Position] | None = asyncio.ensure_future(rig.close_to(stop.lowest_mm(recipe)))
     try:
         while True:
+            # Checked before the frame is taken: only a frame from after the move's end shows that nothing was met.
             ended = moving if moving is not None and moving.done() else None
             if ended is not None:
                 newer_than_s = ended.result().at_s
@@ -67,6 +68,7 @@ async def sweep(rig: MovingRig, recipe: Recipe, measure: Measure) -> Met:
                     moving, stopped_s = None, time.monotonic()
                 seen = await seeing
             finally:
+                # Where this task is cancelled, `asyncio.wait` does not cancel what it waits for.
                 seeing.cancel()
             if stop.touches(seen):
                 if moving is not None:
@@ -81,6 +83,7 @@ async def sweep(rig: MovingRig, recipe: Recipe, measure: Measure) -> Met:
                 if not waited and now_s > newer_than_s + unseen_s / 2:
                     newer_than_s = stopped_s  # little or nothing of the unseen way is left since that frame
                     continue
+                # The fingers have waited at that frame's width until now, so their unseen way begins now.
                 newer_than_s = now_s if waited else newer_than_s
                 moving = asyncio.ensure_future(rig.close_to(stop.lowest_mm(recipe)))
     finally:
@@ -121,9 +124,11 @@ async def close_on(rig: MovingRig, recipe: Recipe, width_mm: float, goes_on: Goe
             newer_than_s = step.last_frame.captured_s
             # The frame was captured between two of the last three readings.
             doubt_mm = max(each.within_s for each in readings[-3:]) * recipe.gripper.speed_mm_s
+            # A frame of fingers that have not moved yet is no image on the way.
             if step.move.width_mm < start_mm and doubt_mm <= rig.finest_step_mm:
                 passed.put_nowait(step)
         if moving.done():
+            # Raises the gripper's fault, if the move ended by one.
             moving.result()
             passed.put_nowait(None)
         if await measuring:
@@ -144,6 +149,7 @@ async def _seen(rig: MovingRig, newer_than_s: float, readings: list[_Read], meas
 async def _passing(rig: MovingRig, newer_than_s: float, readings: list[_Read]) -> Step:
     """The next frame with the width at its capture, interpolated between readings."""
     frame = await rig.frame(newer_than_s)
+    # Read after the frame has come, so that its capture is between two readings and no width is extrapolated.
     readings.append(await _read(rig))
     times_s = [each.position.at_s for each in readings]
     width_mm = float(np.interp(frame.captured_s, times_s, [each.position.width_mm for each in readings]))

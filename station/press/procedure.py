@@ -83,6 +83,7 @@ async def take_step(rig: Rig, recipe: Recipe, number: int, width_mm: float) -> S
 async def close_in_steps(rig: Rig, recipe: Recipe, start_mm: float, goes_on: GoesOn) -> None:
     """Close by the recipe's steps, in measured widths from the first step's, until the recipe or `goes_on` ends it."""
     for number in range(1, recipe.steps.number + 1):
+        # From the first step's width, so that the deviations of the gripper's counts do not add up.
         if not await goes_on(await take_step(rig, recipe, number, start_mm - number * recipe.steps.step_mm)):
             return
 
@@ -114,6 +115,7 @@ async def onset(rig: Rig, recipe: Recipe, opened: Position, measure: Measure, lo
         met_mm, before, touching = await search.first_contact(opened.width_mm, opened, seen_clear=wider)
         if before is not None or not wider:
             return await search.confirmed(met_mm, before, touching)
+        # The requested width grows, not the reached one: so it ends also where something keeps the jaws from opening.
         from_mm += recipe.steps.step_mm
         opened = await rig.open(min(from_mm, rig.widest_mm))
 
@@ -151,6 +153,7 @@ async def bracketed_onset_mm(
         Its measured width; the smaller one where nothing touches before.
     """
     width_mm = untouched_mm - rig.finest_step_mm
+    # Down to half a step above: nearer, the gripper would be at the touched width again.
     while width_mm > touched_mm + rig.finest_step_mm / 2:
         seen = await measure(await take_step(rig, recipe, 0, width_mm))
         if stop.touches(seen):
@@ -182,6 +185,7 @@ class _Search:
             move = at or await self._rig.close_to(width_mm)
             step, at = Step(-1, move, await self._rig.frames(1)), None
             next_mm = width_mm - self._rig.finest_step_mm
+            # Only where a next step is measured in its place: not for held fingers, and not at the search's end.
             if seen_clear and not move.held and next_mm >= self._lowest_mm:
                 seen_clear, before, unmeasured, width_mm = False, step, step, next_mm
                 continue
@@ -211,4 +215,5 @@ class _Search:
             if stop.touches(start):
                 return Onset(before, start)
             width_mm, nearer, touching = await self.first_contact(width_mm - self._rig.finest_step_mm)
+            # `nearer` is None where the next width shows a contact at once: `before` is then the last step without one.
             before = nearer or before

@@ -58,6 +58,7 @@ async def take_reference(rig: Rig, number: int) -> Step:
         StationError: a fault of the rig.
     """
     await rig.make_ready()
+    # Before the arm leaves: with closed fingers it would tear what they hold.
     opened = await open_jaws(rig)
     await rig.leave_nest()
     frames = await rig.frames(number)
@@ -118,6 +119,7 @@ def check_reference(image: Image, golden: PreparedReference | None, settings: Re
             messages.REFERENCE_SATURATED(found=100 * saturated, limit=100 * settings.saturated_share),
         )
     detail = sharpness(image)
+    # A golden reference of another camera mode cannot be compared.
     if golden is None or golden.shape != image.shape:
         return ReferenceProperties(detail, saturated, 0.0)
     contact = golden.method.measure(image)
@@ -135,6 +137,7 @@ def check_reference(image: Image, golden: PreparedReference | None, settings: Re
             AlarmId.CAMERA_LED_DEAD,
             messages.REFERENCE_LIGHT(levels=drift, renewal=golden.renewal),
         )
+    # Of a method without a gate only the contact itself is known.
     if contact.found if contact.gate is None else contact.gate > settings.most_change:
         raise BadReferenceError(
             AlarmId.REFERENCE_BAD,

@@ -63,6 +63,7 @@ def longest_unseen_s(recipe: Recipe) -> float:
 
 def steps_to_decide(recipe: Recipe) -> int:
     """Count the steps from the first image to the last damage threshold that a fruit has to keep."""
+    # A step that is `AT_MM` short of the threshold is at it, so that no further one is needed.
     return min(recipe.steps.number, ceil((recipe.damage.passing_closing_mm - AT_MM) / recipe.steps.step_mm))
 
 

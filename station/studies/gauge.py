@@ -95,6 +95,7 @@ def analyse(values: npt.ArrayLike, tolerance: float | None = None) -> Gauge:
     by_name = {source.name: source.mean_square for source in sources}
     within = by_name["equipment"]
     against = within if pooled else by_name["interaction"]
+    # AV, INT and PV are differences of mean squares, which chance may make negative: then they are 0.
     variances = {
         "EV": within,
         "AV": max(0.0, (by_name["operators"] - against) / (parts * repeats)),
@@ -116,6 +117,7 @@ def analyse(values: npt.ArrayLike, tolerance: float | None = None) -> Gauge:
         for name in shown
     )
     grr, between = sqrt(variances["GRR"]), sqrt(variances["PV"])
+    # AIAG's ndc: 1.41 times PV over GRR, rounded down.
     categories = int(1.41 * between / grr) if grr else None if between else 0
     return Gauge(sources, pooled, components, categories, tolerance)
 

@@ -62,6 +62,7 @@ def measure_dummy(task: GaugeTask, parts: int) -> Simulated:
     Returns:
         The measurement with the truth of `DUMMY_TRUTHS`.
     """
+    # So that --jobs gives the number of cores used.
     cv2.setNumThreads(1)
     recipe, ball, unit = find_recipe(task.fruit), ball_of(task, parts), setup_of(task).unit
     generator = np.random.default_rng([task.seed, 104, task.part, task.operator, task.repeat])

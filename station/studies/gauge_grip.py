@@ -145,6 +145,7 @@ class Grip:
 
     def held(self, closing_mm: float) -> Contact:
         """Measure one step by itself, at a true closing that something else than the gripper's counts decides."""
+        # Counts from the stop's width on, so that `close_to` does not round it.
         width_mm = self._rig.counts_from_mm = self._rig.fruit.width_mm - closing_mm
         return self._measurement.measure(asyncio.run(take_step(self._rig, self._recipe, 0, width_mm))).contact
 
@@ -187,6 +188,7 @@ class Grip:
         async def measure(step: Step) -> MeasuredStep:
             return self._measurement.seek(step)
 
+        # Half a count of room: rounding adds no count and takes none away.
         lowest_mm = start_mm - (_MOST_COUNTS - 0.5) * count_mm
         try:
             found = asyncio.run(onset_from(self._rig, self._recipe, start_mm, lowest_mm, measure))

@@ -96,6 +96,7 @@ def read_measurements(path: Path) -> list[Measurement]:
     try:
         if path.stat().st_size > _LARGEST_BYTES:
             raise BadInputError(f"{path}: expected at most {_LARGEST_BYTES >> 20} MB; is it the right file?")
+        # Spreadsheets may begin a file with a byte order mark.
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not text in UTF-8"

@@ -73,6 +73,7 @@ def part_of(task: GaugeTask) -> Fruit:
 
 def setup_of(task: GaugeTask) -> Setup:
     """Return the operator's properties; the first has the fitted unit."""
+    # 101 to 104 make the draws of operator, placing, grip and dummy independent of each other.
     generator = np.random.default_rng([task.seed, 101, task.operator])
     x_px, y_px = generator.normal(0.0, _HABIT_PX, 2)
     turn_deg = float(generator.normal(0.0, _HABIT_DEG))
@@ -103,6 +104,7 @@ def measure_part(task: GaugeTask) -> Simulated:
     Returns:
         The measurement with the truths of `PART_TRUTHS`.
     """
+    # So that --jobs gives the number of cores used.
     cv2.setNumThreads(1)
     recipe = find_recipe(task.fruit)
     fruit, setup, pose = part_of(task), setup_of(task), pose_of(task)

@@ -81,10 +81,12 @@ def store(study: GaugeStudy, page: str, out: Path) -> None:
         "grr.json": (json.dumps(summary(study), indent=2) + "\n").encode(),
         "report.html": page.encode(),
     }
+    # Beside the folder: only within one file system a folder is renamed as a whole.
     unfinished = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
     try:
         for name, data in files.items():
             write_atomically(unfinished / name, data)
+        # A folder of `mkdtemp` is readable for its user only.
         unfinished.chmod(0o755)
         with contextlib.suppress(FileNotFoundError):
             out.rmdir()

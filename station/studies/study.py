@@ -140,6 +140,7 @@ def _result(study: Study, place: int) -> dict[str, float]:
     images = [image_at(sample.closings_mm, study.result_closings_mm)[place] for sample in study.samples]
     areas = np.array([sample.areas_px[at] for sample, at in zip(study.samples, images, strict=True)])
     truth = np.array([sample.true_areas_px[at] for sample, at in zip(study.samples, images, strict=True)])
+    # An image without a true contact must not divide by 0.
     ratio = areas / np.maximum(truth, 1)
     return {
         "closing_mm": study.result_closings_mm[place],

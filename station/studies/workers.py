@@ -46,6 +46,7 @@ def on_this_machine(work: Callable[[One], Answer], tasks: Sequence[One], jobs: i
                 "a process that measured was killed; give the same command again, with fewer --jobs if memory was short"
             ) from error
         except BaseException:
+            # This cancels only tasks that have not begun, so the processes of the others are ended.
             pool.shutdown(wait=False, cancel_futures=True)
             for process in multiprocessing.active_children():
                 process.terminate()

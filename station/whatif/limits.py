@@ -124,6 +124,7 @@ def exponent_of(fruit: Sequence[MarkedFruit]) -> Exponent | None:
             lengths[group] -= lengths[group].mean()
             areas[group] -= areas[group].mean()
     spread = float(lengths @ lengths)
+    # One slope, and a level for each kind, are fitted.
     freedom = len(known) - 1 - len(set(good.tolist()))
     if spread < 1e-9 or freedom < 1:
         return None
@@ -150,6 +151,7 @@ def at_reference(fruit: Sequence[MarkedFruit], exponent: float, reference_mm: fl
 
 def errors(good: Values, bad: Values, limits: Values) -> tuple[Counts, Counts]:
     """Count the good fruit that each limit diverts, and the bad ones that it passes; `good` and `bad` as `choose`."""
+    # By "right" a fruit passes by its own value: the judge passes an area that meets its limit exactly.
     diverted = len(good) - np.searchsorted(np.sort(good), limits, side="right")
     return diverted, np.searchsorted(np.sort(bad), limits, side="right")
 
@@ -202,12 +204,16 @@ def _cheapest(steps: Values, cost: Values, there: npt.NDArray[np.bool_]) -> Valu
     """
     cost = np.where(there, cost, np.inf)
     # A limit anywhere from one value to the next errs alike. Beyond the last nothing is known.
+    # A gap ends at the next step that the row has, which is the least of all that follow.
     after = np.minimum.accumulate(np.where(np.isfinite(cost), steps, np.inf)[:, :0:-1], axis=1)[:, ::-1]
     ends = np.column_stack([after, np.full(len(cost), np.inf)])
     ends = np.where(np.isfinite(ends), ends, steps)
+    # Equal costs may differ by rounding.
     cheap = cost <= cost.min(axis=1, keepdims=True) + 1e-12
+    # Gap and middle are those of the logarithm, as areas differ by shares.
     widest = np.where(cheap, ends / steps, 0.0).argmax(axis=1)
     low, high = steps[widest], ends[np.arange(len(cost)), widest]
+    # Rounding must not take the limit below the value that it includes.
     return np.maximum(low, np.sqrt(low * high))
 
 
@@ -218,6 +224,7 @@ def rate_interval(happened: int, number: int) -> Interval:
 
 def fewest_fruit(rate: float) -> int:
     """Return the number of fruit without an error that shows an error rate of at most `rate`, between 0 and 1."""
+    # Without an error the two-sided interval of Clopper and Pearson ends at 1 - 0.025^(1/n).
     return math.ceil(math.log((1 - CONFIDENCE) / 2) / math.log(1 - rate))
 
 

@@ -20,6 +20,7 @@ def read_marks(path: Path) -> dict[int, Mark]:
     try:
         with path.open("rb") as file:
             data = file.read(_LARGEST_FILE_BYTES + 1)
+        # Spreadsheets may begin a file with a byte order mark.
         text = data.decode("utf-8-sig")
     except OSError as error:
         raise BadInputError(

@@ -52,6 +52,7 @@ class ProgressFile:
         if lines and _parsed(lines[0]) != self._header:
             self.__exit__()
             raise BadInputError(messages.OTHER_DRAFT(folder=str(self._path.parent)))
+        # The next line must not join the rest of the one that was cut short.
         os.ftruncate(self._descriptor, len(whole))
         os.lseek(self._descriptor, 0, os.SEEK_END)
         for line in lines[1:]:

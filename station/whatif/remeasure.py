@@ -67,10 +67,12 @@ def _measured(
         raise CannotRemeasureError(messages.OTHER_PROGRAM())
     confidence = now.confidence
     if confidence is not None and then.confidence and stored.confidence is not None:
+        # The agreement of the frames, which is 1 at most.
         confidence *= min(1.0, stored.confidence / then.confidence)
     scale_mm2 = stored.area_mm2 / stored.area_px if stored.area_px else _scale(press)
     area_mm2 = now.area_px * scale_mm2
     flags = set(now.flags)
+    # The method set its flags by the confidence before that factor.
     if confidence is not None and confidence < draft.robust.least_confidence:
         flags.add(Flag.LOW_CONFIDENCE)
     return Measured(stored.closing_mm, area_mm2, now.area_px, confidence, frozenset(flags)), now.is_firm

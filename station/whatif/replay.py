@@ -127,6 +127,7 @@ def _judged(
 def _judgement(then: Press, whole: Press, own: Recipe, draft: Recipe) -> Judgement | Message:
     """Return the draft's verdict on presses together, or why it is not known."""
     if whole.onset_mm is None:
+        # The draft searches no deeper, so it touches nothing either.
         sooner = draft.expected_width.smallest_mm >= own.expected_width.smallest_mm
         if sooner or whole.interruptions:
             return judge(whole, draft)
@@ -136,6 +137,7 @@ def _judgement(then: Press, whole: Press, own: Recipe, draft: Recipe) -> Judgeme
     verdict = judge(press, draft)
     proven = verdict.outcome == "FAIL"
     void = bool(press.interruptions) or not _fits(press.onset_mm, draft)
+    # Steps that no rule stopped ended by the gripper, held or closed, or by their number; the draft's end there too.
     ended = _at_its_last_step(press, draft) or (
         not stopped and draft.steps.number == own.steps.number and len(press.points) == len(whole.points)
     )

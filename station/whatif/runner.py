@@ -42,6 +42,7 @@ class Batch(NamedTuple):
 
 def replay_batch(batch: Batch) -> list[Replayed]:
     """Judge a batch, in any process."""
+    # So that --jobs gives the number of cores used.
     cv2.setNumThreads(1)
     draft = Recipe.model_validate_json(batch.draft)
     own = {sha256: recipe_of_snapshot(text) for sha256, text in batch.own.items()}
@@ -126,6 +127,7 @@ def _flow(
                 yield replay_batch(mine)
             if not under_way:
                 return
+            # While there is more to do here, the others are not waited for.
             done, under_way = wait(under_way, 0 if mine is not None else None, FIRST_COMPLETED)
             for future in done:
                 yield future.result()

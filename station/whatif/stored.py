@@ -137,6 +137,7 @@ def _stored(row: Any, curve: Iterable[Any], images: tuple[tuple[int | None, byte
         uncertainty_mm if onset_mm is not None else 0.0,
         points,
         interruptions,
+        # 0 is a size that the PLC did not give, as in its registers.
         FruitSize(length_mm_x10 / 10 or None, size_class or None),
         measured.get("gripper_resolution_mm", 0.0),  # records of before were judged without it
         measured.get("scale_uncertainty", 0.0),
@@ -149,6 +150,7 @@ def _stored(row: Any, curve: Iterable[Any], images: tuple[tuple[int | None, byte
             onset_mm=first.onset_mm,
             onset_uncertainty_mm=first.onset_uncertainty_mm,
             points=first.points,
+            # After an interruption there is no second press.
             interruptions=(),
         )
     return StoredPress(sequence, lot, judged, recipe_sha256, press, gate_factor, images, first)
@@ -189,6 +191,7 @@ def _images(
     for sequence, kind, step, sha256 in rows:
         try:
             data = Path(image_path(folder, sha256)).read_bytes()
+        # Housekeeping may have removed it; `remeasured` reports an image that is missing.
         except OSError:
             continue
         found.setdefault(sequence, []).append((None if kind == "reference" else step, data))

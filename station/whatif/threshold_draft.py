@@ -81,6 +81,7 @@ def draft_recipe(recipe: Recipe, best: Proposal, name: str, folder: Path | None)
     if recipe.damage.size is not None and recipe.damage.size.exponent != best.exponent:
         changes["damage.size.exponent"] = best.exponent
         comments["damage.size.exponent"] = f"regression over these fruit; {marked}"
+    # A recipe whose early stop is below a limit is refused.
     if recipe.early_stop.area_mm2 < limit:
         changes["early_stop.area_mm2"] = limit
         comments["early_stop.area_mm2"] = "the last limit"
