@@ -96,6 +96,7 @@ def _at_rest(mode: Command) -> tuple[Row, ...]:
         row(mode, on, note_command, reused, result("failed"), watch, to=FAILED, when=is_reused),
         row(mode, on, note_command, result("no_command"), watch, to=FAILED, when=is_no_command),
         row(mode, on, note_command, result("station_lost"), watch, to=FAILED, when=station_is_lost),
+        # `request` follows `result`, which clears the number of the pending request.
         row(mode, on, note_command, result("executing"), end_watch, request, to=EXECUTING),
         row(mode, Signal.EXECUTE_OFF, end_watch, to=IDLE),
         row(mode, Signal.WRITER_LOST, end_watch, to=IDLE),

@@ -49,6 +49,7 @@ def _writer_granted(work: Work, _event: WriterGranted) -> None:
 def _writer_withdrawn(work: Work, _event: WriterWithdrawn) -> None:
     work.state.writer = False
     work.state.seen = work.state.last_heartbeat = None
+    # The next writer's fruit must not be judged by this one's size.
     work.state.size = NO_SIZE
     work.stop(Signal.PLC_SILENT)
     work.signals.append(Signal.WRITER_LOST)
@@ -104,6 +105,7 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
         control = event.inputs.control
         state.seen = control
         rose = control - (seen or frozenset())
+        # A low bit in a writer's first write counts as fallen: `enable` written 0 there and then 1 arms.
         fell = frozenset(bit for bit in _BITS if bit not in control and (seen is None or bit in seen))
         if seen is None:  # a bit that was high all along is no order to clear or to reset
             rose -= {"clear_error", "reset_counters"}
@@ -113,10 +115,12 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
             work.signals.append(on)
         elif bit in fell and off is not None:
             work.signals.append(off)
+    # Before the acknowledgement is evaluated: what the PLC had taken before this start is no wrong one.
     _apply_first_write(work, event)
     changed = event.inputs.acknowledged_sequence not in {before.acknowledged_sequence, 0}
     acknowledged = state.journal.acknowledged
     had = {acknowledged, state.journal.plc_taken or acknowledged, state.taken or acknowledged}
+    # A bit left high over a reconnect is for what the PLC had taken, and no wrong acknowledgement.
     left_high = seen is None and event.inputs.acknowledged_sequence in had
     _acknowledged(work, event, rose, changed=changed, left_high=left_high)
     if "acknowledge" in fell:

@@ -51,6 +51,7 @@ def run(work: Work, sequence: int, pending: RequestBegin, deadline_s: float) -> 
     state.running = running(pending, sequence, work.at, within_s, station)
     if state.taken == sequence:
         state.taken = 0  # what runs has no outcome yet: the PLC's number was wrong, or of another station
+    # Written before there was an outcome to take: at the next start this number must not take it.
     if state.inputs.acknowledged_sequence == sequence:
         work.update_journal(disbelieved=sequence)
     work.update_journal(accepted_id=pending.trigger_id, highest=sequence)
@@ -104,8 +105,10 @@ def refuse_reused_sequence(work: Work) -> None:
 def refuse_as_lost(work: Work) -> None:
     """Refuse as station lost, `acquiring`; if the station began it, its result is never published."""
     pending = work.state.pending
+    # The station may have begun it, and its arm may be on the way to the fruit.
     work.state.acquiring = True
     if pending is not None:
+        # Only this journal has the refusal: without it a start after a loss of power would adopt the inspection.
         work.durable = True
         work.update_journal(disowned=(*work.state.journal.disowned, pending.trigger_id)[-MOST_DISOWNED:])
     refuse_pending(work, Refusal.STATION_LOST)

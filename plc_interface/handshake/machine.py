@@ -20,6 +20,7 @@ def step(before: State, event: Event, settings: HandshakeSettings) -> tuple[Stat
     Args:
         event: with its time, which never goes back.
     """
+    # A shallow copy is enough: effects replace the values of a state, and change none in place.
     work = Work(copy.copy(before), event.at, event, settings)
     while (due := _due(work)) is not None:
         work.stop(due)

@@ -43,6 +43,7 @@ def take_unwritten(work: Work, sequence: int) -> None:
         return
     state.taken = sequence
     if any(outcome.sequence == sequence for outcome in state.queue):
+        # Results are published in order: what is older was taken before it.
         state.queue = tuple(outcome for outcome in state.queue if outcome.sequence > sequence)
         state.unconfirmed = 0 if bit_is_high(work) else sequence
         acknowledge(work, sequence)

@@ -171,6 +171,7 @@ def restarted(journal: Journal, at: Moment, station_lost_after_s: float) -> Stat
         "asked_id": None,
     }
     if journal.command_result == COMMAND_RESULT.code("executing"):
+        # Its answer was lost with the process: whether it was carried out is unknown.
         changes["command_result"] = COMMAND_RESULT.code("timed_out")
     if journal.asked_id is not None:
         changes["disowned"] = (*journal.disowned, journal.asked_id)
@@ -184,6 +185,7 @@ def restarted(journal: Journal, at: Moment, station_lost_after_s: float) -> Stat
         state.last_refusal, state.last_refused_id, state.missed = Refusal.STATION_LOST, journal.asked_id, True
         state.counters = {**state.counters, "count_triggers": 1, "count_missed": 1}
     if journal.running is not None:
+        # How long it has run is known by UTC only: the monotonic clock may have started anew since.
         ran_s = max(0.0, (at.utc_ms - journal.running.began_utc_ms) / 1000)
         state.running = journal.running.model_copy(update={"began_s": at.s - ran_s})
         state.inspection = Inspection.RUNNING

@@ -57,6 +57,7 @@ def _status(state: State) -> dict[str, Value]:
         "command_result": journal.command_result,
         "active_recipe": station.recipe_number if station else 0,
         "active_recipe_checksum": station.recipe_checksum if station else 0,
+        # More may wait than there are places: `buffer_results` can be cleared meanwhile.
         "free_places": max(0, state.places - taken),
         "waiting_results": len(state.queue),
         "error_code": station.error_code if station else STATION_LOST_CODE,
@@ -121,6 +122,7 @@ def result_values(outcome: Outcome) -> dict[str, Value]:
         "result_reasons": _REASONS.flags(reason.value for reason in outcome.reasons),
         "result_area_mm2_x100": None if area is None else _bounded(100 * area, 0, 2**31 - 1),
         "result_area_mm2": None if area is None else min(area, 3.4e38),
+        # The end of this register's range, and of the closing's, says that there is none: the bound is one before it.
         "result_area_px": None if outcome.area_px is None else min(outcome.area_px, 2**32 - 2),
         "result_closing_mm_x100": (
             None if outcome.closing_mm is None else _bounded(100 * outcome.closing_mm, -(2**15) + 1, 2**15 - 1)

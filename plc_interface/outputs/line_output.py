@@ -89,6 +89,7 @@ class RejectGate:
         """Order a reject actuation for what may not go on. An outcome may come again after a restart."""
         if not self._may_go_on(outcome) and outcome.sequence not in self._due:
             self._due[outcome.sequence] = at_count = self._io.count_at_gate(outcome.encoder)
+            # On the disk before the caller's journal has the outcome, which is then not forwarded again.
             self._file.write(self._due)
             self._order(outcome.sequence, at_count)
 
@@ -122,6 +123,7 @@ class RejectGate:
 
     def _is_too_far(self, sequence: int, at_count: int) -> bool:
         count = self._io.encoder_count()
+        # No fruit on its way from the nest is further from the gate than the nest.
         if count is None or ahead(count, at_count) <= self._distance:
             return False
         error = RejectRefusedError(sequence, messages.COUNT_TOO_FAR(at_count=at_count, now_count=count))

@@ -49,6 +49,7 @@ class Interface:
         self._before_reset = (0, 0)
         self._written: dict[str, Value] = {}
         self._writer: Peer | None = None
+        # A trigger that was pending is refused from here on, which has to outlive a loss of power.
         journal.write(self._state.journal, durable=True)
         self._publish()
 
@@ -76,12 +77,14 @@ class Interface:
         self._inputs = replace(self._inputs, **known)
         count = self._output.encoder_count()
         inputs = self._inputs if count is None else replace(self._inputs, encoder=count)
+        # Before the write: a trigger in it is accepted only if its fruit can be diverted now.
         self._report_output()
         self.feed(ev.PlcWrote(now(), inputs, frozenset(known)))
 
     def on_writer(self, peer: Peer | None, change: WriterChange) -> None:
         """Handle a change of the right to write."""
         self._writer = peer
+        # A takeover withdraws first, so that the new connection has to arm anew.
         if peer is None or change is WriterChange.TAKEN_OVER:
             self.feed(ev.WriterWithdrawn(now()))
         if peer is not None:

@@ -69,4 +69,5 @@ async def serve(configuration: Configuration) -> None:
         await server.stop()
         await interface.stop()
         await output.stop()
+        # Last: until here this process may write the journal, and a second interface must not start.
         journal.close()

@@ -18,6 +18,7 @@ def request_real_time_priority() -> bool:
     leaves 5 % of each second to the others (`sched_rt_runtime_us`).
     """
     gc.collect()
+    # Later collections skip what exists by now, so that their pauses are short.
     gc.freeze()
     try:
         os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(REAL_TIME_PRIORITY))

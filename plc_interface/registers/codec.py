@@ -102,6 +102,7 @@ def _encode_text(register: Register, value: float | str) -> tuple[int, ...]:
 def _decode_text(register: Register, words: Sequence[int]) -> str:
     """Return the text up to the first NUL, without the spaces with which some PLCs fill a text up."""
     raw = struct.pack(f">{len(words)}H", *words)
+    # Latin-1 decodes every byte, so that the check below refuses what is not ASCII.
     text = raw.split(b"\0", 1)[0].rstrip(b" ").decode("latin-1")
     if not text.isascii() or not (text.isprintable() or not text):
         raise RegisterValueError(f"{register.name} holds printable ASCII characters only, not {raw!r}")

@@ -71,6 +71,7 @@ class Connection(asyncio.BufferedProtocol):
 
     def get_buffer(self, sizehint: int) -> memoryview:
         """Return the buffer for the next bytes."""
+        # Never empty: what is unfinished is less than one of the four ADUs that fit.
         return self._view[self._filled :]
 
     def buffer_updated(self, nbytes: int) -> None:

@@ -186,6 +186,7 @@ class ConnectionManager:
         return not self._own(peer)
 
     def _sweep(self) -> None:
+        # First: a fault below must not end the checks.
         self._sweeping = self._loop.call_later(SWEEP_S, self._sweep)
         now_s, settings = self.now_s(), self._settings
         for member in tuple(self._members.values()):

@@ -118,6 +118,7 @@ class RegisterImage:
         Raises:
             RequestError: as `written`.
         """
+        # For its check of the addresses only.
         self.bits(address, count)
         first, last = address // 16, (address + count - 1) // 16
         words = self._words(first, last + 1 - first)

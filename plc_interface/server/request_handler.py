@@ -94,6 +94,7 @@ class RequestHandler:
             raise RequestError(ExceptionCode.BUSY, Trouble.NOT_WRITER, "another client holds the right to write")
         self._on_write(peer, write.values)
         self._image.commit(write.values)
+        # Last: a scan that gives the right back is carried out whole, as its owner's.
         if self._image.value(_KEY) != WRITE_KEY:
             self._release()
         return write.response()

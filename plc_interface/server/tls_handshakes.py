@@ -35,6 +35,7 @@ class TlsHandshakes(asyncio.Protocol):
     async def close(self) -> None:
         """End the handshakes under way. Idempotent."""
         for plain in self._under_way.values():
+            # Shutting down ends the handshake on the duplicate as well; closing this descriptor would not.
             with contextlib.suppress(OSError):  # the client has gone already
                 plain.get_extra_info("socket").shutdown(socket.SHUT_RDWR)
         await asyncio.gather(*self._under_way)
@@ -44,6 +45,7 @@ class TlsHandshakes(asyncio.Protocol):
         try:
             await asyncio.get_running_loop().connect_accepted_socket(
                 lambda: connection,
+                # A socket of its own: the plain transport closes the other one at the end.
                 plain.get_extra_info("socket").dup(),
                 ssl=self._context,
                 ssl_handshake_timeout=self._deadline_s,

@@ -100,6 +100,7 @@ class Session:
             now = datetime.now(UTC).isoformat(timespec="milliseconds")
             data = {"id": f"{event.data['station']}/{event.data['origin']}/{event.entry}", "sent": now, **event.data}
             await self._client.publish(f"{self._root}/{event.kind}", json_text(data).encode(), _AT_LEAST_ONCE)
+        # After the broker's acknowledgements: where the process ends before, events are repeated and none is lost.
         self._keep(batch, batch.up_to)
 
     async def idle(self, pause_s: float) -> None:

@@ -182,9 +182,11 @@ def integrity(connection: sqlite3.Connection) -> Iterator[str]:
 
 
 def _copied(folder: Path, partial: Path) -> Manifest:
+    # The head is read before the copy: the row that it names has to be in it.
     path, known = partial / FILE_NAME, read_head(folder)
     with reading(folder) as live, closing(sqlite3.connect(path)) as target:
         plain(live).backup(target)  # in one step: a reader of the write-ahead log delays no other
+        # The copy is one file, whose hash is signed: no write-ahead log belongs to it.
         target.execute("PRAGMA journal_mode = DELETE")
         faults = [*check_schema(target), *integrity(target)]
     if faults:

@@ -61,6 +61,7 @@ def open_engine(path: Path, mode: Literal["ro", "rw", "rwc"]) -> Engine:
 
     @event.listens_for(engine, "begin")
     def _begin(connection: Connection) -> None:
+        # A writer locks at once: where another one wrote since its first read, SQLite refuses the lock without waiting.
         connection.exec_driver_sql("BEGIN" if read_only else "BEGIN IMMEDIATE")
 
     return engine

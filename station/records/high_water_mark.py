@@ -67,6 +67,7 @@ class HighWaterMark:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
+        # A new file's name is durable only with its folder.
         if fresh:
             sync_folder(self.path.parent)
         self.known, self._older = True, 1 - self._older

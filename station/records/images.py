@@ -177,6 +177,7 @@ class ImageStore:
                     raise _OverQuotaError(messages.QUOTA_FULL())
                 raise _NotStoredError(messages.QUOTA_FULL() if over else messages.DISK_NEARLY_FULL())
             freed_bytes, names = removed
+            # After the commit that removed their rows: no row refers to a file that is gone.
             for name in names:
                 with contextlib.suppress(FileNotFoundError):
                     os.unlink(image_path(self._folder, name))

@@ -209,6 +209,8 @@ def _connector(
 
     def before_commit(connection: Connection) -> None:
         nonlocal saved, ahead
+        # Before the commit: a number that the file alone has is skipped; one that the database alone has could be given
+        # twice.
         if mark.value != saved:
             mark.save()
             saved = mark.value

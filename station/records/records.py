@@ -233,6 +233,7 @@ class Records:
         """
         opened = self._get()
         wanted = bool(record.images) and self._settings.images_quota_mb > 0
+        # Before the commit: the row says already whether images follow.
         reserved = wanted and opened.images.reserve()
         not_wanted = messages.IMAGES_NOT_WANTED()
         dropped = messages.IMAGES_DROPPED(cause=messages.TOO_MANY_WAIT())
@@ -245,6 +246,7 @@ class Records:
             return conclude(connection, sequence, record, {"PASS": accepted, "other": state})
 
         future = opened.writer.submit(work)
+        # Not after the wait: a commit that outlasts the deadline gets its images too.
         future.add_done_callback(lambda done: self._hand_over(opened, done, sequence, record, reserved=reserved))
         outcome, _ = await self._answer(future)
         return outcome

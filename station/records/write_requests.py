@@ -65,6 +65,7 @@ def insert_trigger(connection: Connection, sequence: int, trigger: Trigger, boot
     }
     del begun["recipe"]
     _lost(begun)  # validates the trigger: even its station_lost outcome must be possible
+    # Before the row is there: the gap is found by the highest number so far.
     note_skipped(connection, sequence)
     sha256 = recipe.sha256 if recipe else None
     connection.execute(insert(inspections), {**begun, "boot": boot, "recipe_sha256": sha256, "images_state": ""})
@@ -100,6 +101,7 @@ def conclude(
     if row.judged is not None and standing is not None:
         return standing, None
     judged = _judged(row._asdict(), record)
+    # An outcome that the PLC was given stays in force; the judgement is stored beside it.
     standing = standing or judged
     passed = record.outcome == standing.outcome == "PASS"
     images_state = images_states["PASS" if passed else "other"]
@@ -160,6 +162,7 @@ def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: st
     connection.execute(_UPDATE, {"number": outcome.sequence, **published})
     stood = None if found is None or found.standing is None else Outcome.model_validate_json(found.standing)
     index_reasons(connection, stood, outcome)
+    # Only where it changes: another seal would cover what somebody else may have changed since.
     if stood != outcome:
         seal(connection, outcome.sequence, "outcome")
     queue_event(connection, "inspection", outcome.sequence)

@@ -86,6 +86,7 @@ class Writer:
             Its result once it is durable, or a `RecordsError`.
         """
         future: Future[T] = Future()
+        # Under the lock, so that no request is queued behind the entry that ends the thread.
         with self._gate:
             if self._closed and threading.current_thread() is not self._thread:
                 future.set_exception(RecordsClosedError(messages.CLOSED(), messages.OPEN_FIRST()))
@@ -145,6 +146,7 @@ class Writer:
                 future.set_exception(answer)
             else:
                 future.set_result(answer)
+        # After the answers: the PLC does not wait for the signature of the audit trail's head.
         if committed:
             self._after_commit()
 

@@ -98,6 +98,7 @@ class Station:
         liveness, metrics = Liveness(), Metrics(versions[PROGRAM], settings.inspection_deadline_s or _USUAL_DEADLINE_S)
         state_files, alarms = StateFiles(configuration.home), AlarmManager(metrics, to_restore=True)
         records = Records(configuration.home / "records", configuration.records, self.boot)
+        # Closed in reverse order: the records last, right after the last audit entry.
         stack.push_async_callback(records.close)
         audit = AuditLogger(records)
         stack.push_async_callback(self._note_end, audit)

@@ -169,6 +169,7 @@ def _mirrored(region: Mask, constants: Constants) -> tuple[int, int, int, int]:
     Not where a contact reaches opposite borders: it fills the field instead.
     """
     _, _, width, height = cv2.boundingRect(region)
+    # In order around the image: neighbours in the list meet in a corner.
     sides = ((width, region[:, 0]), (height, region[0]), (width, region[:, -1]), (height, region[-1]))
     lengths = (height, width, height, width)
     chords = [np.count_nonzero(side) / length for (_, side), length in zip(sides, lengths, strict=True)]
@@ -178,6 +179,7 @@ def _mirrored(region: Mask, constants: Constants) -> tuple[int, int, int, int]:
     for number, (across, _) in enumerate(sides):
         in_corner = max(chords[number - 1], chords[(number + 1) % 4]) > constants.corner_chord
         if chords[number] > (constants.corner_chord if in_corner else constants.border_chord):
+            # As far as the region extends: its mirror image reaches no further.
             found[number] = across
     left, top, right, bottom = found
     return left, top, right, bottom
@@ -226,6 +228,7 @@ def _steepest(
     steepest = steepest[steepest > 0]
     strong = steepest[int(constants.strong_quantile * (steepest.size - 1))] if steepest.size else 1.0
     least = constants.least_steepness
+    # A ray is worth 1 at most: a few very steep ones cannot pull the path away from all others.
     reward = np.maximum(np.minimum(fall * (1 / strong), 1) - least, 0) * (1 / (1 - least))
     path = closed_path(-reward, stiffness)
     side = max(1, round(_SIDE_SHARE / (shares[1] - shares[0])))
@@ -248,6 +251,7 @@ def closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArray
     """
     rays, steps = cost.shape
     turns = np.concatenate([cost, cost[: rays // 2]])
+    # Both directions side by side, so that one call advances both; infinite columns between them bar a way across.
     half, other = len(turns) // 2, steps + _LONGEST_JUMP
     width = other + steps
     padded = np.full((half, width + 2 * _LONGEST_JUMP), np.inf, np.float32)
@@ -278,6 +282,7 @@ def closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArray
     for jump, rows in enumerate(reached[1:], 1):
         np.maximum(jumps, (rows < least).view(np.uint8) * np.uint8(jump), out=jumps)
         np.minimum(least, rows, out=least)
+    # Bytes are read as plain integers, which a loop goes through much faster than through an array's scalars.
     taken = jumps.tobytes()
     paths: list[list[int]] = []
     for end, side in zip(ends, (0, other), strict=True):
@@ -287,5 +292,6 @@ def closed_path(cost: npt.NDArray[np.floating], stiffness: float) -> npt.NDArray
             path.append(place)
         paths.append(path)
     path = paths[0][::-1] + paths[1]
+    # At its two ends the path is not bound to close: a quarter turn at either end is left out.
     start = rays // 4
     return np.array(path[rays : rays + start] + path[start:rays], np.intp)

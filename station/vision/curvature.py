@@ -32,6 +32,7 @@ def curvature(change: FloatImage, step: int, constants: Constants) -> FloatImage
         Shape (height, width), grey levels per pixel of the working image.
     """
     smooth = cv2.GaussianBlur(change, (0, 0), constants.curvature_blur / step)
+    # By Sobel's kernel a slope of 1 per pixel is 8, and a pixel here is `step` pixels of the working image.
     slope_x, slope_y = (
         np.asarray(cv2.Sobel(smooth, cv2.CV_32F, dx, dy, scale=1 / (8 * step)), np.float32)
         for dx, dy in ((1, 0), (0, 1))

@@ -85,6 +85,7 @@ class Debris:
 
 def _pattern(light: FloatImage, places: npt.NDArray[np.bool_]) -> FloatImage:
     """Return what the debris adds to the reference: the reference less its continued surroundings, else zero."""
+    # Wider than the debris, so that its rim is not continued into its place.
     wide = cv2.dilate(places.astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_HALO_PX, _HALO_PX)))
     without = cv2.inpaint(light.astype(np.uint8), wide, _INPAINT_PX, cv2.INPAINT_NS).astype(np.float32)
     smooth = cv2.GaussianBlur(without, (0, 0), _INPAINTED_BLUR_PX)

@@ -85,7 +85,9 @@ def filled(edge: Edge, shape: tuple[int, int], scale: tuple[float, float] = (1.0
     Pixels whose middle is enclosed. OpenCV's `fillPoly` adds those that the line touches: 1 % of a contact of 12 mm².
     """
     height, width = shape
+    # Whole numbers are the pixels' middles, but sizes scale from the image's corner, half a pixel away.
     (x, y), (next_x, next_y) = ends = np.array([(edge.points + 0.5) * scale - 0.5] * 2).transpose(0, 2, 1)
+    # `next_x` and `next_y` are views of `ends`, and change with it.
     ends[1] = np.roll(ends[1], -1, axis=1)
     # Down a column one is inside after each odd crossing of the edge.
     first, last = (np.clip(np.ceil(of(x, next_x)), 0, width).astype(np.intp) for of in (np.minimum, np.maximum))

@@ -22,6 +22,7 @@ class PressTracker:
 
     def prepare_next(self, image: Image) -> None:
         """Measure one frame of the next step, the same object that `measure_step` gets, which then has less to do."""
+        # The image is stored too: while it lives, no other object has its id.
         self._ahead[id(image)] = image, self._method.measure(image, previous=self._previous)
 
     def measure_step(self, frames: Sequence[Image], mean: Image | None = None) -> Contact:

@@ -118,6 +118,7 @@ class ReferenceCheck:
             energy = length_squared(known)
             weight = 1.0 / (length_squared(seen) + energy + floor)
             slope = float(np.vdot(product(known, seen), weight)) / float(np.vdot(energy, weight) + _LEAST_RATIO)
+            # By its own slope: fog takes a share of the pattern everywhere alike, and would pass for another unit.
             unexplained = seen - known * min(max(slope, 0.0), 1.0)
             power, pattern = (resized(one, self._tiles) for one in (length_squared(unexplained), energy))
             ratio = np.log(power / (pattern + floor) + _LEAST_RATIO)

@@ -136,6 +136,7 @@ def find_region(
         inner |= floor
     # A flat centre has not moved; it lies within what has, and costs nothing. Elsewhere no gain is as low as -1.
     least_gain = inner.astype(np.float32) - 1
+    # Twice, since windows and shares go with the region's size: with one pass drupelets are measured worse.
     for last in (False, True):
         radius = radius_of(mask)
         # A long body's window goes with its width: the level that a wider one spreads beyond it would count as body.
@@ -158,10 +159,12 @@ def find_region(
             share = min(max(share + p.share_prominent * prominence, p.share_least), p.share_most)
         gain = _clipped(level, cap) - np.float32(share)
         np.maximum(gain, least_gain, out=gain)
+        # After the hull's limit: another body's places cost within the hull too.
         if others is not None:
             gain[others > 0] = -share
         if floor is not None:
             gain[floor > 0] = 1 - share
+        # With the hull: the middle of an open ring would be drawn towards its closed side.
         rays = Rays.about(inner | mask)
         every = 1 if last else _FIRST_EVERY
         # The rays' axes have the determinant 1 and keep an area: its radius in px is one in the rays' unit too.
@@ -224,6 +227,7 @@ def _is_skin_by_curvature(moved: Movement, halved: Movement, region: Mask, const
 def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float:
     """Return the share of a region's squared change that is as fine as achenes: medians' ratio, 0 in too few pixels."""
     size = (change.shape[1], change.shape[0])
+    # The constants are on the half grid, and this change is at half of its size.
     sigmas = (constants.level_window / 2, constants.coarse_blur / 2)
     elements, slopes = (np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32) for sigma in sigmas)
     inside = cv2.resize(region, size, interpolation=cv2.INTER_NEAREST) > 0
@@ -294,6 +298,7 @@ def _coherence(moved: Movement, halved: Movement, region: Mask, window_px: float
         weighted_median(one, moved.weight) if seen else quantile(thinned(one), _FLOOR_QUANTILE)
         for one in (length_squared(smooth), mean_square)
     ]
+    # The windowed square of the change less its cast is expanded, so that it needs no second blur.
     cast = np.array(cv2.mean(moved.change, region))
     square = length_squared(np.asarray(cv2.subtract(smooth, cast), np.float32))
     cast = cast[:3].astype(np.float32)
@@ -316,6 +321,7 @@ def _most_gained(gain: FloatImage, rays: Rays, reach: float, every: int, stiffne
     along = cv2.remap(gain, x, y, cv2.INTER_LINEAR, None, cv2.BORDER_REPLICATE)
     along[(x < 0) | (y < 0) | (x > width - 1) | (y > height - 1)] = 0
     # A place's weight is its distance from the middle: the sum over rays is then the sum over the area.
+    # The factor makes a full ray's gain 4 at every reach, so that the path's stiffness means the same for every size.
     gained = np.cumsum(along * away, axis=1) * (8 / (steps * reach))
     return np.asarray(away[closed_path(-gained, stiffness)], np.float64)
 

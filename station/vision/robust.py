@@ -189,8 +189,11 @@ class RobustMethod:
         self._clean = resized(self._debris.clean, self._quarter)
         self._weak = WeakContactDetector(self._light, lit, self._debris.clean, constants, parameters.gate_ratio)
         unsaturated = np.asarray((self._reference < SATURATED_LEVEL).all(axis=2), np.float32)
+        # Where the reference is cut off, its difference from a frame says nothing of the gel's slope.
         self._unsaturated = cv2.merge([resized(unsaturated, self._half)] * 3)
+        # The response sums up the colours: without light in one of them the same curvature shows less.
         least = float(np.mean(lit)) * parameters.least_bend
+        # The recipe's slope is per pixel of the printed size: a larger pixel sees more change.
         self._least_curvature = least * PRINTED_LONG_SIDE_PX / max(self._reference.shape)
 
     @property
@@ -198,6 +201,7 @@ class RobustMethod:
         """The stages in their order."""
         return (
             self._check_reference,
+            # Before the fit: what was in contact is no background, and a body let go is measured as a single image.
             self._follow,
             self._subtract_background,
             self._destripe,
@@ -230,6 +234,7 @@ class RobustMethod:
         """
         state = self._start(image, previous)
         state.agreed, state.firm_only = agreed, firm_only
+        # The stages change the difference in place.
         difference = state.difference.copy() if on_stage else state.difference
         for stage in self.pipeline:
             stage(state)
@@ -286,12 +291,14 @@ class RobustMethod:
         state.background = self._model.fit(state.quarter, state.calm, None if before is None else before.coefficients)
         if "background" not in self._without:
             state.difference -= state.background.levels
+        # After the model is taken off: blanked before, a saturated place would show the model's own levels.
         state.difference *= self._unsaturated
 
     def _destripe(self, state: State) -> None:
         """Take rows' and columns' noise off, by the places without contact."""
         if "destriping" in self._without:
             return
+        # Debris is bridged later: in the difference it still stands out, and it is no offset of a line.
         trusted = state.calm * self._clean
         state.difference = destriped(state.difference, trusted, self._constants)
 
@@ -373,6 +380,7 @@ class RobustMethod:
         """Search for a contact below the detection threshold where nothing was found."""
         if state.outlines or state.firm_only or "weak contact" in self._without:
             return
+        # Of the frame, not of the change: the robust fit leaves edges, to which the detector would respond.
         place = self._weak.place(self._weak.response(state.frame))
         least = self._constants.weak_least_curvature * state.threshold
         if place is None or state.moved.curvature[self._weak.near(place)].max() <= least:
@@ -406,6 +414,7 @@ class RobustMethod:
             for outline in state.outlines:
                 state.mask |= outline.drawn(height, width)
         if state.floor is not None and state.before is not None and state.before.floor is not None:
+            # The floor whole, not the one a pixel within it: the area of a body at rest must not shrink.
             floor = cv2.resize(state.before.floor, (width, height), interpolation=cv2.INTER_NEAREST)
             state.mask |= np.asarray(floor * 255, np.uint8)
         shape = state.changed.shape
@@ -427,10 +436,12 @@ class RobustMethod:
         # fruit's holds little change too: the flat middle of its contact is most of it.
         drawn = state.gate > 1 or cv2.countNonZero(state.changed) >= self._constants.witness_least * shown_px
         held = state.mask | before.least if drawn else before.least
+        # A faint body's outline does not grow with the compression; what has changed does, so that steps do not tie.
         if not drawn or np.array_equal(held, before.least):
             height, width = self._shape[:2]
             changed = cv2.resize(state.changed, (width, height), interpolation=cv2.INTER_NEAREST)
             held = held | np.asarray(changed * 255, np.uint8)
+        # Only what is returned: `contact` stays what this step shows, so that nothing of this enters the floor.
         state.mask = held
         state.flags.add(Flag.LOWER_BOUND)
 
@@ -468,6 +479,7 @@ class RobustMethod:
         known = None
         if "texture" in self._without:
             known = False
+        # With hardly any background directions say little of the skin: what an earlier step has seen of it holds.
         elif state.before is not None and state.background.share < self._constants.known_share / 2:
             known = state.before.textured
         return find_region(state.moved, start, self._constants, others, state.floor, texture=known)
@@ -480,6 +492,7 @@ class RobustMethod:
         smallest_px = self._parameters.smallest_contact_px * outline.inside.size / PRINTED_IMAGE_PX
         if cv2.countNonZero(outline.inside) < smallest_px:
             return None
+        # Something touches already: an outline with little support becomes a lower bound, and is not dropped.
         if state.floor is not None:
             return outline
         if self._one_colour(state, outline, sure=sure):

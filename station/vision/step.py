@@ -46,6 +46,7 @@ def mean_image(frames: Sequence[Image]) -> Image:
     """The mean of one or more frames of one shape, dtype uint8, rounded; of one frame itself."""
     if len(frames) == 1:
         return frames[0]
+    # Room for 256 frames, the rounding included.
     total = np.zeros(frames[0].shape, np.uint16)
     for frame in frames:
         total += frame

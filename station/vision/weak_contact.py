@@ -76,15 +76,18 @@ class WeakContactDetector:
         self._most_of_fine = constants.weak_most_of_fine
         self._reference, self._lit = reference, lit.astype(np.float32)
         # The dent that is looked for, 0.27 mm, is what the curvature's smoothing leaves of a point.
+        # An image below the working size is not enlarged: the dent has fewer pixels there.
         sigma_px = constants.curvature_blur / 2 * min(1.0, max(height, width) / (LONG_SIDE_PX / 2))
         self._reach_px = int(np.ceil(_REACH * sigma_px))
         x = np.arange(-self._reach_px, self._reach_px + 1, dtype=np.float32)
         dent = np.exp(-np.square(x / sigma_px) / 2)
         self._dent, self._slope = dent / dent.sum(), -x * dent / dent.sum()
         cut_off = (((reference < _LEVELS[0]) | (reference > _LEVELS[1])) & lit).any(axis=2)
+        # Cosines are fitted to whole columns: a few places that are cut off bend the rest of theirs.
         blind = (cut_off | (cut_off.mean(axis=0) > _MOST_CUT_OFF) | (clean == 0)).astype(np.uint8)
         side = 2 * self._reach_px + 1
         around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+        # A blind place spoils the response wherever the filter reaches it.
         self._valid = (cv2.dilate(blind, around) == 0).astype(np.float32)
         down = ((np.arange(height) + 0.5) / height - 0.5)[:, None]
         orders = np.arange(min(_COSINES_DOWN, max(1, height // 4)))
@@ -102,6 +105,7 @@ class WeakContactDetector:
         across, down = (np.linspace(-1, 1, side, dtype=np.float32) for side in reference.shape[1::-1])
         moved = (cv2.Sobel(pattern, cv2.CV_32F, dx, dy) for dx, dy in ((1, 0), (0, 1)))
         known = [pattern, pattern * across[:, None], pattern * down[:, None, None], *moved]
+        # Without their slow parts, as the change has lost its own before these are taken off it.
         left = np.stack([self._without_slow(np.asarray(one, np.float32)) for one in known], axis=-1)
         columns = left.reshape(-1, 3, len(known)).transpose(1, 0, 2)
         return np.asarray(np.linalg.qr(columns)[0], np.float32)
@@ -127,6 +131,7 @@ class WeakContactDetector:
         total = np.zeros(left.shape[:2], np.float32)
         of_fine: list[float] = []
         for across, down in ((self._slope, self._dent), (self._dent, self._slope)):
+            # Zero beyond the border: a mirror image there made half of all false maxima.
             filtered = cv2.sepFilter2D(left, cv2.CV_32F, across, down, borderType=cv2.BORDER_CONSTANT)
             slopes = np.asarray(filtered, np.float32)
             spread = _spread(_inner(slopes))
@@ -187,6 +192,7 @@ def _in_units_of_noise(slopes: FloatImage, spread: FloatImage) -> FloatImage:
     noise = np.clip(_inner(slopes) / spread, -_WINSORISED, _WINSORISED)
     common = noise.T @ noise
     size = np.sqrt(np.maximum(common.diagonal(), NEXT_TO_NOTHING))
+    # The ridge also makes the matrix regular where a colour has no light, and so no noise.
     common = (1 - _RIDGE) * common / np.outer(size, size) + _RIDGE * np.eye(3)
     apart = np.linalg.inv(np.linalg.cholesky(common)) / spread
     alone = cv2.transform(slopes, apart.astype(np.float32))

@@ -161,6 +161,7 @@ class LineIo:
         if (why_not := self.why_not_ready) is not None or link is None or now is None:
             why = messages.NOT_ORDERED(why=why_not or messages.NO_COUNT())
             raise NotReadyError(messages.SHOT(sequence=sequence, what=why))
+        # Expected before it is sent: the gate may report at once.
         with self._rejects.under_way(Order(sequence, lane, at_count)) as pending:
             if ahead(now, at_count) <= 0:
                 raise LateRejectError(sequence, messages.COUNT_PAST(at_count=at_count, now_count=now))

@@ -135,6 +135,7 @@ class UrRtdeProcess:
             control = self._commanding()
             x, y, z, rx, ry, rz = control.getForwardKinematics(joints, self._tool())
             pose = list(offset_pose((x, y, z, rx, ry, rz), request.offset_mm))
+            # Checked first: without a solution getInverseKinematics ends the control program.
             if not control.getInverseKinematicsHasSolution(pose, joints):
                 return False
             found.extend(control.getInverseKinematics(pose, joints))

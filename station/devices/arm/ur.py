@@ -233,6 +233,7 @@ class UrArm:
             await self._begin(target, straight=straight)
             await self._arrive(target, where, tolerance_rad)
         except asyncio.CancelledError:
+            # A second cancellation must not keep the arm from being stopped.
             with contextlib.suppress(ArmFault):
                 await asyncio.shield(self._brake())
             raise

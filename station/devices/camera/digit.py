@@ -249,6 +249,7 @@ class DigitCamera:
             self._leds_wanted.set()
             while not self._stopping.is_set():
                 if self._leds_wanted.is_set():
+                    # Cleared first: a light that is wanted meanwhile is set before the next frame.
                     self._leds_wanted.clear()
                     self._set_light(capture)
                 read, image = capture.read()

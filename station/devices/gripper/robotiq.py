@@ -157,6 +157,7 @@ class Robotiq2F85:
                     try:
                         await self.link.go_to(sent, speed, force)
                     finally:
+                        # Also after a failure: the command may have reached the gripper.
                         self.known_width_mm = None
                     renewed_at = stride // 2 if sent < count else None
                     status, at_s = await self._arrival(sent, deadline_s, stops, renewed_at)

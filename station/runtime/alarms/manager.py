@@ -159,6 +159,7 @@ class AlarmManager:
         """Raise the alarm of the fault of the `arm`, `gripper` or `camera`, or clear the alarms of a healthy one."""
         alarm = None if fault is None else alarm_of(device, fault)
         before, self._device_alarms[device] = self._device_alarms.get(device), alarm
+        # A device that was not heard since the start may still have the cause of an alarm that it shares with this one.
         kept = {other for name in self._watched if name not in self._device_alarms for other in OF_DEVICE[name]}
         if self._stopped_on_pendant():
             kept.add(AlarmId.ARM_NOT_REMOTE)

@@ -42,9 +42,11 @@ class Hold:
                 "the disk is slow: if the process is killed now, the next start does not know of %s",
                 self.event or "the end of the hold",
             )
+            # Stored, since the event loop refers to its tasks only weakly.
             self._late.add(storing)
             storing.add_done_callback(self._late.discard)
 
     async def _store(self) -> None:
         async with self._turn:
+            # In its turn, and of the event as it is then: a slow write cannot bring an older hold back.
             await asyncio.to_thread(self._files.write, FILE_NAME, _NONE if self.event is None else self.event.encode())

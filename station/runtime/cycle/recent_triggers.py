@@ -49,6 +49,7 @@ class RecentTriggers:
         waiting = self._outcomes.get(sequence)
         if waiting is None:
             raise UnknownInspectionError(messages.NOT_THIS_START(number=sequence), messages.ASK_OPEN())
+        # Several may wait for it: one that gives up must not cancel it for the others.
         return await asyncio.shield(waiting)
 
 
@@ -78,4 +79,5 @@ class PendingTrigger:
 
     async def answered(self) -> BeginReply:
         """Wait for the answer, or raise what has ended the request without one."""
+        # A request that is cancelled must not count as answered.
         return await asyncio.shield(self._answer)

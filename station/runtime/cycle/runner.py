@@ -237,6 +237,7 @@ class CycleRunner:
             self._doing.pop(me, None)
 
     async def _halt(self) -> None:
+        # Before the devices: an action that goes on could move one again after its stop.
         await self._forget(keep=_ON_THE_DISK)
         try:
             async with asyncio.timeout(HALT_DEADLINE_S):
@@ -247,6 +248,7 @@ class CycleRunner:
     async def _forget(self, keep: Container[Action] = ()) -> None:
         left = {task for task, action in self._doing.items() if action not in keep}
         for task in left:
+            # Forgotten before it has ended: an event that it still ends with is not taken.
             del self._doing[task]
             task.cancel()
         if left:

@@ -218,6 +218,7 @@ class Service:
     async def published(self, outcome: Outcome) -> None:
         """Store that the PLC was given a final outcome, and count it, once; cancel a fruit still under inspection."""
         now = self.triggers.inspection(outcome.sequence)
+        # Before the disk has it: a fruit that is placed meanwhile goes where the PLC's outcome sends it.
         if now is not None:
             now.published = outcome
         first = await self.registry.records.published(outcome)
@@ -371,6 +372,7 @@ class Service:
         now = pending.inspection
         now.accepted_s = time.monotonic()
         try:
+            # Known before the answer: the request for its outcome follows at once.
             self.triggers.accepted(now)
             self.registry.accepted(now)
             reply = BeginReply(sequence=now.sequence, deadline_s=now.limits.inspection_s + RECORD_NO_RESULT_S)

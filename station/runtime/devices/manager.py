@@ -335,6 +335,7 @@ class DeviceManager:
         if not self.light_by_hand:
             return
         light = self._configuration.camera.digit
+        # Cleared first, so that another light that is set meanwhile is restored as well.
         self.light_by_hand = False
         try:
             await self.cell.camera.set_leds(Leds(light.red, light.green, light.blue))

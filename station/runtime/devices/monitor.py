@@ -108,6 +108,7 @@ class DeviceMonitor:
     async def _pause(self, pause_s: float) -> None:
         until_s = time.monotonic() + pause_s
         self._again.clear()
+        # In pieces, each of which is progress: a long pause must not count as stuck.
         while (left_s := until_s - time.monotonic()) > 0:
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(min(left_s, PERIOD_S)):

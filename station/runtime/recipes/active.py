@@ -78,6 +78,7 @@ class ActiveRecipes:
 
     def read(self) -> None:
         """Read files and history again. Blocks for some milliseconds a file."""
+        # Before the files are read: what changes meanwhile is read at the next refresh.
         self._signature = self._store.signature()
         stored, begun = self._stored_controls(), True
         try:
