@@ -174,7 +174,7 @@ def restarted(journal: Journal, at: Moment, station_lost_after_s: float) -> Stat
         # Its answer was lost with the process: whether it was carried out is unknown.
         changes["command_result"] = COMMAND_RESULT.code("timed_out")
     if journal.asked_id is not None:
-        changes["disowned"] = (*journal.disowned, journal.asked_id)
+        changes["disowned"] = (*journal.disowned, journal.asked_id)[-MOST_DISOWNED:]
     state = State(
         reset_utc_ms=at.utc_ms,
         journal=journal.model_copy(update=changes),

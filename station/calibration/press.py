@@ -1,7 +1,6 @@
 """Ball press: presses the ball step by step and measures it, for calibration and verification."""
 
 import asyncio
-import contextlib
 import logging
 from dataclasses import dataclass
 
@@ -15,7 +14,7 @@ from station.errors import StationError
 from station.messages import calibration as messages
 from station.messages.message import Message
 from station.press.measurement import PressMeasurement
-from station.press.procedure import bracketed_onset_mm, take_step
+from station.press.procedure import bracketed_onset_mm, release_to_the_end, take_step
 from station.press.reference import reference_image, take_reference
 from station.press.rig import MeasuredStep
 from station.press.rig import Step as PressStep
@@ -75,12 +74,8 @@ class BallPress:
     async def let_go(self) -> None:
         """Open the jaws after a failure, whose cause matters more than their own; to the end, also when called off."""
         # `asyncio.wait` does not cancel what it waits for, so a further cancellation does not interrupt the opening.
-        releasing = asyncio.create_task(self._rig.release(), name="letting go of the ball")
-        while not releasing.done():
-            with contextlib.suppress(asyncio.CancelledError):
-                await asyncio.wait({releasing})
         try:
-            releasing.result()
+            await release_to_the_end(self._rig)
         except StationError as error:
             log.warning("the jaws could not be opened: %s", error)
 

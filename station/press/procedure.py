@@ -5,10 +5,12 @@ What differs is the rig and the observer.
 """
 
 import asyncio
+import contextlib
 from typing import NamedTuple, Protocol
 
 from station.errors import StationError
 from station.messages import grip as messages
+from station.messages.message import Message
 from station.press import stop
 from station.press.motion import GoesOn, Measure, Met, sweep
 from station.press.reference import take_reference
@@ -48,6 +50,7 @@ async def press(rig: MovingRig, recipe: Recipe, observer: Observer) -> None:
         GripError: no sound frame came, nothing was touched, or the fingers or the arm did not return.
         StationError: a device's fault; the fingers are open by then, if they could move.
     """
+    failed: Message | None = None
     try:
         await observer.see_reference(await take_reference(rig, recipe.imaging.reference_frames))
         start = await _start(rig, recipe, observer)
@@ -55,9 +58,19 @@ async def press(rig: MovingRig, recipe: Recipe, observer: Observer) -> None:
             await close_in_steps(rig, recipe, start.move.width_mm, observer.see_step)
     except (StationError, asyncio.CancelledError) as error:
         failed = error.message if isinstance(error, StationError) else messages.CALLED_OFF()
-        await rig.release(failed)
         raise
-    await rig.release()
+    finally:
+        await release_to_the_end(rig, failed)
+
+
+async def release_to_the_end(rig: Rig, failed: Message | None = None) -> None:
+    """Release by `Rig.release`, also where the caller is cancelled meanwhile: jaws must not stop halfway on a fruit."""
+    releasing = asyncio.create_task(rig.release(failed), name="release")
+    while not releasing.done():
+        with contextlib.suppress(asyncio.CancelledError):
+            # `asyncio.wait` does not cancel what it waits for, so a cancellation does not interrupt the opening.
+            await asyncio.wait({releasing})
+    releasing.result()
 
 
 async def _start(rig: MovingRig, recipe: Recipe, observer: Observer) -> Step | None:

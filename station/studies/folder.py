@@ -92,7 +92,8 @@ class StudyFolder:
                 "its samples cannot be mixed with new ones: name a new folder with --out"
             )
         if differing:
-            words = ", ".join(f"{name} {theirs[name]} in place of {ours[name]}" for name in differing[:-1] or differing)
+            differing = [name for name in differing if name != "measured_by"]  # a checksum, which says nothing
+            words = ", ".join(f"{name} {theirs[name]} in place of {ours[name]}" for name in differing)
             raise BadInputError(f"{self.folder}: holds another study ({words}); name a new folder with --out")
 
     def stored(self, number: int) -> SampleResult | None:

@@ -68,6 +68,7 @@ class FruitOnGel:
     def __init__(self, fruit: Fruit, pose: Pose, gel: Gel) -> None:
         self._fruit, self._gel = fruit, gel
         rows, columns = np.indices(GRID_SHAPE, dtype=np.float32)
+        # A grid point is at the middle of its pixels, as cv2.resize takes it when it scales back to them.
         centre = (GRID_STEP - 1) / 2
         x_mm = (columns * GRID_STEP + centre - pose.x_px) * np.float32(gel.mm_per_px)
         y_mm = (rows * GRID_STEP + centre - pose.y_px) * np.float32(gel.mm_per_px)
@@ -75,14 +76,18 @@ class FruitOnGel:
         across = (x_mm * np.cos(turn) + y_mm * np.sin(turn)).astype(np.float32)
         along = (y_mm * np.cos(turn) - x_mm * np.sin(turn)).astype(np.float32)
         lean = np.tan(np.deg2rad(pose.tilt_deg))
+        # A leant surface touches beside its middle, lean²·R/2 earlier: added, so that first contact is at approach 0.
         shape = fruit.gap_mm(across, along) + lean * x_mm + 0.5 * lean**2 * fruit.surface.radius_mm
         texture = fruit.texture_mm(across, along)
         grid_mm = gel.mm_per_px * GRID_STEP
         coarse = cv2.GaussianBlur(texture, (0, 0), _BRIDGE_MM / grid_mm)
         wide = cv2.GaussianBlur(texture, (0, 0), _LEVELLED_MM / grid_mm)
+        # Without its mean level, which the smoothed surface of `gap_mm` already contains.
         self._relief = np.asarray(cv2.GaussianBlur(texture, (0, 0), _SKIN_MM / grid_mm) - wide, np.float32)
+        # Raised texture would make the gap negative near the foremost point; `dent_mm` needs 0 or more.
         self._gap = np.maximum(0.0, shape + _BRIDGED * (coarse - wide)).astype(np.float32)
         height, width = SENSOR_SHAPE
+        # The true edge is cut at the sensor's resolution: on the grid it would have steps of two pixels.
         self._fine_gap = np.asarray(cv2.resize(self._gap, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
 
     def pressed(self, squeezed: Squeezed) -> Footprint:
@@ -97,11 +102,16 @@ class FruitOnGel:
         dent = dent_mm(self._gap, approach, surface, self._gel)
         pressure_mpa = squeezed.force_n / (np.pi * contact_radius_mm**2)
         imprint = min(1.0, pressure_mpa / (_FULL_IMPRINT_PRESSURE * self._gel.modulus_mpa))
+        # 1 at the foremost point, 0 at the contact's edge, where no pressure presses the texture in.
         within = np.maximum(0.0, 1.0 - self._gap * np.float32(2.0 / approach))
+        # The gel has its share of the approach only; where the skin is deep, it is dented less.
         dent = dent * np.float32(squeezed.gel_share) - np.float32(imprint) * self._relief * within
+        # A paraboloid's slope at the edge is a/R, of which the gel has its share; its gap goes with the radius squared.
         edge_mm = visible_edge_mm(contact_radius_mm, squeezed.gel_share * contact_radius_mm / radius_mm)
         limit_mm = 0.5 * approach * (edge_mm / contact_radius_mm) ** 2
+        # Pits of the skin inside the edge belong to the contact area.
         inside = _filled(self._fine_gap < limit_mm)
+        # A pit deeper than the dent touches nothing: it does not pull the gel out.
         return Footprint(np.maximum(dent, 0.0).astype(np.float32), inside, self._gel.mm_per_px)
 
 

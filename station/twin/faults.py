@@ -44,6 +44,7 @@ class FaultBoard:
             ValueError: the device has no such fault, or the amount is beyond its bounds.
         """
         self._check(fault)
+        # In this form NaN is refused too: every comparison with it is false.
         if not 0 <= amount <= LARGEST_AMOUNT:
             raise ValueError(f"amount: expected a number from 0 to {LARGEST_AMOUNT:g}, found {amount!r}")
         if fault not in self._active:

@@ -65,6 +65,7 @@ VARIETIES = {
         (8.0, 24.0, 24.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0),
         1.5, 0.49, 0.0, 0.02, (5.0, 5.0), 1e6, 0.0, smooth,
     ),
+    # Steel, rigid beside the gel. It does not creep: its retardation is a divisor that must not be 0.
     Kind.TEST_SPHERE: Variety(
         (0.9, 6.0, 6.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0),
         2e5, 0.3, 0.0, 0.0, (1.0, 1.0), 1e9, 0.0, smooth,
@@ -98,6 +99,7 @@ class Fruit:
     @property
     def half_axes_mm(self) -> tuple[float, float]:
         """Half axes of the ellipsoid across the gripped one: along the columns, along the rows."""
+        # The mean radius goes with the product of both half axes, so that each has the root of the factor.
         flat = np.sqrt(self._damage.flattening)
         return self.width_mm / 2 * flat, self.length_mm / 2 * flat
 
@@ -105,6 +107,7 @@ class Fruit:
     def surface(self) -> Surface:
         """The curvature where the gel touches."""
         across_mm, along_mm = self.half_axes_mm
+        # The geometric mean of the principal radii across²/depth and along²/depth.
         return Surface(self.width_mm / 2, across_mm * along_mm / (self.width_mm / 2))
 
     @property
@@ -147,6 +150,7 @@ class Fruit:
 
     def texture_mm(self, x_mm: FloatArray, y_mm: FloatArray) -> FloatArray:
         """Return the skin's depth below its highest points, mm: pits, seeds, drupelets, calyx. Args as for `gap_mm`."""
+        # The second number separates the random streams of one seed: 0 draws the sizes, 1 the skin.
         return self.variety.texture(x_mm, y_mm, np.random.default_rng([self.seed, 1]))
 
 

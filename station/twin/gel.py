@@ -97,6 +97,7 @@ class Surface:
             relative_squared: (x/a)² + (y/b)² with the half axes across, any shape; beyond the ellipsoid's
                 outline the gap goes on growing in proportion.
         """
+        # Past the pole the gap grows on instead of ending, so that `relative_squared` can invert it everywhere.
         cut = np.minimum(relative_squared, np.float32(_POLE))
         gap = self.depth_mm * (1.0 - np.sqrt(1.0 - cut) + (relative_squared - cut))
         return gap.astype(np.float32)
@@ -125,8 +126,11 @@ def dent_mm(gap_mm: FloatArray, approach_mm: float, surface: Surface, gel: Gel) 
     if approach_mm <= 0:
         return np.zeros_like(gap_mm)
     at_edge = surface.relative_squared(np.array([approach_mm / 2], np.float32))[0]
+    # At least 1: the halo has no value inside the contact, and np.where below computes it for every point.
     outwards_squared = np.maximum(surface.relative_squared(gap_mm) / at_edge, np.float32(1.0))
     contact_radius_mm = np.float32(np.sqrt(approach_mm * surface.radius_mm))
+    # An elliptic contact has no single radius: its mean one turns the relative distance into mm.
     beyond_mm = (np.sqrt(outwards_squared) - 1.0) * contact_radius_mm
     halo = np.float32(approach_mm) * half_space_surface(outwards_squared) * gel.outer_share(beyond_mm)
+    # At the edge both are half the approach, so that the surface has no step there.
     return np.where(gap_mm < approach_mm / 2, approach_mm - gap_mm, halo).astype(np.float32)

@@ -45,6 +45,7 @@ class Squeeze:
         relaxed = 1.0 - variety.creep * (1.0 - np.exp(-held_s / fruit.retardation_s))
         plane = 1.0 - variety.poisson**2
         approach = np.linspace(0.0, 0.45 * fruit.width_mm, _SAMPLES)
+        # The contact's radius follows from the whole approach, however the two bodies share it.
         gel_compliance = (1.0 - gel.poisson**2) / (gel.modulus_mpa * gel.stiffening(approach, self._radius_mm))
         softening = fruit.contact_softening(np.sqrt(approach * self._radius_mm))
         front_compliance = plane / (fruit.contact_modulus_mpa * softening * relaxed)
@@ -52,9 +53,11 @@ class Squeeze:
         force = 4.0 / 3.0 / compliance * np.sqrt(self._radius_mm) * approach**1.5
         # Where the contact grows onto a soft patch the mean modulus falls; the force that was reached stays.
         force = np.maximum.accumulate(force)
+        # The damage is on the gel's side alone: the back is sound flesh.
         back_modulus_mpa = fruit.modulus_mpa * relaxed / plane
         back = 0.5 * (0.75 * force / (back_modulus_mpa * np.sqrt(self._radius_mm))) ** (2 / 3)
         pressed = np.linspace(0.0, 10.0 * _SPONGE_FLAT_MM, _SAMPLES)
+        # The sponge's law has no simple inverse: it is tabulated, and read backwards.
         sponge = np.interp(force, _SPONGE_N_PER_MM * pressed * (1.0 + (pressed / _SPONGE_FLAT_MM) ** 3), pressed)
         self._approach, self._force = approach, force
         self._dent = _limited(approach * gel_compliance / compliance, gel.thickness_mm)
@@ -75,4 +78,5 @@ class Squeeze:
 def _limited(dent: npt.NDArray[np.float64], thickness_mm: float) -> npt.NDArray[np.float64]:
     """Bend a dent off towards the deepest that the gel's thickness allows."""
     free, room = _FREE_DENT * thickness_mm, (_DEEPEST_DENT - _FREE_DENT) * thickness_mm
+    # tanh begins with a slope of 1, so that the curve bends off without a kink.
     return np.where(dent > free, free + room * np.tanh((dent - free) / room), dent)

@@ -26,7 +26,9 @@ def achenes(x_mm: FloatArray, y_mm: FloatArray, generator: np.random.Generator) 
     """A strawberry's pits with a seed in each."""
     depth = np.zeros_like(x_mm)
     for centre_x, centre_y in _lattice(3.4, 0.5, generator):
+        # Drawn before the check below: the skin must not depend on which part of the fruit the sensor covers.
         length_mm, width_mm = generator.uniform(1.5, 2.5), generator.uniform(1.0, 1.5)
+        # Beyond 4.5 mm even the longest pit is at most 0.012 mm deep.
         box = _near(x_mm, y_mm, centre_x, centre_y, 4.5)
         if box is None:
             continue
@@ -42,6 +44,7 @@ def drupelets(x_mm: FloatArray, y_mm: FloatArray, generator: np.random.Generator
     """A raspberry's drupelets: caps of spheres side by side, with grooves between them."""
     height = np.full_like(x_mm, -1.0)
     for centre_x, centre_y in _lattice(2.3, 0.25, generator):
+        # Drawn before the check, as for the achenes.
         radius_mm, lift_mm = generator.uniform(1.25, 1.6), generator.uniform(-0.12, 0.0)
         box = _near(x_mm, y_mm, centre_x, centre_y, radius_mm)
         if box is None:

@@ -11,6 +11,7 @@ from station.twin.squeeze import Squeeze, Squeezed
 
 DIGIT_MM = 32.0
 """What the sensor takes of the gripper's opening."""
+# A fruit creeps over seconds (retardation times of 5 s and more): its curve need not be new at every read.
 _CREEP_STEP_S = 0.5
 _SOFTENING_MAX = 0.5
 _SET_SHARE = 0.25
@@ -102,6 +103,7 @@ class World:
         if self._fruit is None or self._squeeze is None or self.sensor_mm() is None:
             return Squeezed(-self.width_mm(opening_mm), 0.0, 0.0, 0.0)
         closing_mm = self._fruit.width_mm + self._holder_mm - self.width_mm(opening_mm)
+        # Before the curve is read, since it may replace it.
         self._age(self._fruit, touching=closing_mm > 0)
         squeezed = self._squeeze.at(closing_mm)
         if squeezed.force_n > self._fruit.variety.yield_n and (
@@ -130,10 +132,12 @@ class World:
         beyond = min(1.0, worst.force_n / yield_n - 1.0)
         set_mm = _SET_SHARE * beyond * worst.closing_mm
         softer = fruit.modulus_mpa * (1.0 - _SOFTENING_MAX * beyond)
+        # Jaws closed far beyond a small fruit would leave hardly any of its width.
         return replace(fruit, width_mm=max(0.5 * fruit.width_mm, fruit.width_mm - set_mm), modulus_mpa=softer)
 
     def _lay(self, fruit: Fruit) -> None:
         self._fruit, self._contact = fruit, None
+        # Made now, so that the first touch does not wait until the skin is drawn.
         self._contact_on_gel(fruit)
         self._recurve(fruit, 0.0)
 
@@ -143,6 +147,7 @@ class World:
         place = round(right_mm, _PLACE_DIGITS), round(down_mm, _PLACE_DIGITS)
         if self._contact is None or self._contact[0] != place:
             x_px, y_px = (mm / self._gel.mm_per_px for mm in place)
+            # The fruit stays in its place: in the image of a sensor that moved it goes the other way.
             pose = replace(self._pose, x_px=self._pose.x_px - x_px, y_px=self._pose.y_px - y_px)
             self._contact = place, FruitOnGel(fruit, pose, self._gel)
         return self._contact[1]

@@ -93,9 +93,7 @@ class Rays(NamedTuple):
             float(np.clip(moments["m01"] / moments["m00"], 0, shape[0] - 1)),
         )
         across, down = np.linalg.inv(self.axes) @ (points - middle).T
-        angles = np.arctan2(down, across)
-        order = np.argsort(angles)
-        radii = np.interp(_ANGLES, angles[order], np.hypot(across, down)[order], period=2 * np.pi)
+        radii = np.interp(_ANGLES, np.arctan2(down, across), np.hypot(across, down), period=2 * np.pi)
         return self._replace(middle=middle), radii
 
 

@@ -49,7 +49,7 @@ def _why_no_evidence(own: Recipe | None, recipe: Recipe) -> str | None:
 
 
 def draft_recipe(recipe: Recipe, best: Proposal, name: str, folder: Path | None) -> tuple[Recipe, str]:
-    """Return the recipe's text with the limit in the place of the one at its closing, or of the last.
+    """Return the recipe's text with the limit in the place of the one at its closing, or the next, or the last.
 
     Earlier limits are lowered and later ones raised where necessary, since limits rise with the closing. The comment
     behind each changed value says where the new one comes from.
@@ -57,9 +57,8 @@ def draft_recipe(recipe: Recipe, best: Proposal, name: str, folder: Path | None)
     limits, limit = recipe.damage.area, round(best.limit_mm2, 1)
     marked = f"`station thresholds`: {len(best.good)} good and {len(best.bad)} bad fruit"
     of = "" if recipe.damage.size is None else "of a fruit of the reference length; "
-    same = [place for place, each in enumerate(limits) if each.closing_mm == best.closing_mm]
-    fits_last = len(limits) == 1 or best.closing_mm > limits[-2].closing_mm
-    chosen = same[0] if same else len(limits) - 1 if fits_last else 0
+    # The first that is not before it, so that the closings still ascend.
+    chosen = next((place for place, each in enumerate(limits) if each.closing_mm >= best.closing_mm), len(limits) - 1)
     changes: dict[str, Any] = {
         f"damage.area[{place}].area_mm2": limit
         for place, each in enumerate(limits)

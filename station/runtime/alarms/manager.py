@@ -49,6 +49,7 @@ OF_DEVICE: dict[str, frozenset[AlarmId]] = {
 _OF_THE_PAST = {AlarmId.RECORDS_LOST, AlarmId.GATE_NOT_FIRED}
 """Alarms of what has happened once, which no check finds undone: a person's acknowledgement ends them."""
 _MOST_UNSAVED = 1000
+"""Changes remembered while the records cannot be written; an estimate of a day's."""
 _ARM = {
     ArmCause.EMERGENCY_STOP: AlarmId.EMERGENCY_STOP,
     ArmCause.PROTECTIVE_STOP: AlarmId.PROTECTIVE_STOP,
@@ -276,7 +277,7 @@ class AlarmManager:
     def _set_all(self, alarms: Alarms, change: str) -> None:
         for alarm, before in self.alarms.known.items():
             if alarms.get(alarm) != before:
-                self._unsaved.append(AlarmEntry(utc_ms(), alarm, change))
+                self._unsaved = [*self._unsaved, AlarmEntry(utc_ms(), alarm, change)][-_MOST_UNSAVED:]
         self.alarms = alarms
         self._publish_active()
 

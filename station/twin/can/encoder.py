@@ -38,6 +38,7 @@ class LineEncoder(TwinNode):
             speed = COUNTS_PER_S / (1 + self._faults.amount(CommonFault.SLOW))
             self._way = (self._way + passed_s * speed) % _RANGE
         if self.operational and now_s >= self._due_s:
+            # After a pause the counts that were due meanwhile are not made up for.
             self._due_s = max(now_s, self._due_s + self.read(0x1800, 5) / 1000)
             position = self.local.tpdo[1]
             position["Position value"].raw = self.count

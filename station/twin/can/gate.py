@@ -59,6 +59,7 @@ class RejectGate(TwinNode):
     def output(self) -> int:
         """The flaps that are open, a bit for each lane: the safe ones unless operational."""
         if not self.operational:
+            # CiA 401: 6206 selects the outputs that take the error value, 6207 is that value.
             return self.read(0x6206, 1) & self.read(0x6207, 1)
         now_s = self._clock.now_s()
         return sum(1 << (lane - 1) for lane, until_s in self._open_until_s.items() if until_s > now_s)
@@ -68,6 +69,7 @@ class RejectGate(TwinNode):
         now_s = self._clock.now_s()
         while self._reports and self._reports[0][0] <= now_s:
             self._send_report(*self._reports.popleft()[1:])
+        # CiA 301: object 1016 has the time in its lower 16 bits, in ms, and the node above them.
         limit_s = (self.read(0x1016, 1) & 0xFFFF) / 1000
         if limit_s and self._station_s is not None and now_s - self._station_s > limit_s:
             self._station_s = None  # watched again from its next beat on (CiA 301, heartbeat consumer)
@@ -75,6 +77,7 @@ class RejectGate(TwinNode):
             if self.operational:
                 self.local.nmt.state = "STOPPED" if self.read(0x1029, 1) == 2 else "PRE-OPERATIONAL"
                 self.on_state()
+        # An RPDO's event timer, in ms, is the longest silence of its sender: here of the encoder.
         limit_s = self.read(0x1401, 5) / 1000
         if self.operational and limit_s and now_s - self._counted_s > limit_s:
             self.raise_error(_COUNT_LOST, _COMMUNICATION)
@@ -89,15 +92,18 @@ class RejectGate(TwinNode):
         self._armed.clear()
         self._open_until_s.clear()
         self._reports.clear()
+        # Counts are ignored outside operational: none is valid now, and the encoder's silence is timed from here.
         self._count = None
         self._counted_s = self._clock.now_s()
         if self.operational:
+            # Not by the next heartbeat: the gate works again only after the station has brought it up anew.
             self.clear_error(_HEARTBEAT_LOST)
 
     def _on_station(self, _can_id: int, _data: bytearray, _timestamp: float) -> None:
         self._station_s = self._clock.now_s()
 
     def _on_count(self, pdo: PdoMap) -> None:
+        # A frame shorter than its mapping would be read as a wrong count.
         if not self.operational or len(pdo.data) * 8 < pdo.length:
             return
         self._count = count = int(pdo["Line encoder count"].raw)
@@ -120,10 +126,12 @@ class RejectGate(TwinNode):
         names = ("Sequence", "Lane", "Pulse in ms", "Fire at count")
         shot = Shot(*(int(pdo[f"Shot order.{name}"].raw) for name in names))
         if shot.sequence in self._armed:
+            # An order that is repeated is confirmed again and stays one shot.
             answer = _ARMED
         elif not 1 <= shot.lane <= _LANES or not shot.pulse_ms:
             answer = _BAD
         elif self._count is None or _ahead(self._count, shot.at_count) <= 0:
+            # Without a count the gate cannot time the flap: refused, as if the place were past.
             answer = _LATE
         elif len(self._armed) >= _PLACES:
             answer = _FULL
@@ -162,9 +170,11 @@ class RejectGate(TwinNode):
         if 0x1600 <= index <= 0x1BFF and self._faults.active(LineFault.MAPPING_REFUSED):
             raise SdoAbortedError(_CANNOT_BE_MAPPED if subindex else _GENERAL)
         if (index, subindex) == (0x1016, 1):
+            # CiA 301: the consumer watches the new node from its first heartbeat on.
             self._station_s = None
             self.network.subscribe(0x700 + (int.from_bytes(data, "little") >> 16 & 0x7F), self._on_station)
 
 
 def _ahead(of: int, count: int) -> int:
+    # Signed, the shorter way round the counter: a wrap of its 32 bits is no jump.
     return (count - of + _RANGE // 2) % _RANGE - _RANGE // 2

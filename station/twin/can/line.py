@@ -74,6 +74,7 @@ class LineNodes:
                 self.gate.network.report_bus_off()
             if self._faults.active(CommonFault.GARBAGE) and self._clock.now_s() > garbage_s:
                 garbage_s = self._clock.now_s() + _GARBAGE_S
+                # Emergency, TPDO 1, SDO answer and heartbeat; with one byte a heartbeat would be well-formed.
                 for base in (0x080, 0x180, 0x580, 0x700):
                     self.gate.network.send_message(base + self.gate.number, b"\xff" if base != 0x700 else b"")
                 self.encoder.network.send_message(0x180 + self.encoder.number, b"\xff")

@@ -48,11 +48,13 @@ class LoopNetwork(canopen.Network):
             OSError: it cannot be had.
         """
         options: dict[str, Any] = (
+            # With a hop limit of 0 no frame leaves this machine.
             {"port": self._settings.port, "hop_limit": 0, "fd": False}
             if self._settings.interface == "udp_multicast"
             else {}
         )
         try:
+            # python-can's own configuration files are ignored: they could name another bus.
             self.bus = can.Bus(
                 interface=self._settings.interface, channel=self._settings.channel, ignore_config=True, **options
             )

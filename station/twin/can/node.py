@@ -31,6 +31,7 @@ class TwinNode:
         """Start as after power-on: all objects as in the data sheet, boot-up message, pre-operational."""
         self.local.data_store.clear()
         self._errors.clear()
+        # On these two changes of state canopen sends the boot-up message and starts the heartbeat.
         self.local.nmt.state = "INITIALISING"
         self.local.nmt.state = "PRE-OPERATIONAL"
 
@@ -69,6 +70,7 @@ class TwinNode:
     def _write_register(self) -> None:
         register = 0
         for bits in self._errors.values():
+            # CiA 301: bit 0, the generic error, is set with any other.
             register |= bits | 1
         self.write(0x1001, 0, register)
 
@@ -83,5 +85,6 @@ class TwinNode:
     def on_state(self) -> None:
         """Called when the state may have changed."""
         if self.operational:
+            # The master has written the PDO objects before; canopen takes mapping and identifiers from them only here.
             self.local.rpdo.read()
             self.local.tpdo.read()

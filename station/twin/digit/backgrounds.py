@@ -47,6 +47,7 @@ def background(fitted: Fitted, unit: int | None) -> FloatArray:
     Returns:
         Shape (640, 480, 3), dtype float32, grey levels, channels B, G, R.
     """
+    # The fitted unit has 0, so that unit 0 has streaks and dust of its own.
     generator = np.random.default_rng([0 if unit is None else unit + 1, 2])
     weights = fitted.background_fitted
     if unit is not None:

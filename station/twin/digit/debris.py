@@ -47,6 +47,7 @@ def moved(specks: list[Speck], generator: np.random.Generator) -> list[Speck]:
     now: list[Speck] = []
     for number, speck in enumerate(specks):
         fate = generator.random()
+        # Number 0 always moves, so that at least one speck has.
         if fate < _STAYED and number:
             now.append(speck)
         elif fate < _STAYED + _MOVED or not number:

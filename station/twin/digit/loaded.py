@@ -86,6 +86,7 @@ def _bands(generator: np.random.Generator) -> FloatArray:
             generator.normal(0.0, 0.35 / order) * np.cos(np.pi * order * place) for order in range(1, _ALONG_COSINES)
         )
         course = np.maximum(0.0, 1.0 + waves) * generator.uniform(*_SIDE_STRENGTHS)
+        # Each band is made as the left side's, then mirrored and turned to its own.
         band = (course[:, None] * profile)[..., None] * colours
         if side in {"right", "bottom"}:
             band = band[:, ::-1]

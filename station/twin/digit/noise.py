@@ -44,6 +44,7 @@ def _banks(levels: tuple[float, ...], seed: int) -> tuple[list[FloatArray], Mapp
         # By OpenCV: numpy takes four times as long for sums and products along pixels of three channels.
         white = cv2.transform(generator.standard_normal((rows, columns, 3), np.float32), mix)
         field = cv2.GaussianBlur(white, (0, 0), _BLUR_ACROSS_PX, sigmaY=_BLUR_DOWN_PX)
+        # The blur lowers the spread, so that each field is scaled by its own to the level.
         spread = cv2.meanStdDev(field)[1].ravel()
         banks.append(np.asarray(cv2.transform(field, np.diag(np.divide(levels, spread))), np.float32))
     return banks, generator.bit_generator.state
@@ -56,6 +57,7 @@ class FrameNoise:
         self._levels = levels
         self._banks, state = _banks(tuple(map(float, levels.pixel)), seed)
         self._generator = np.random.default_rng()
+        # Continues after the banks' draws, so that a sensor made from the cache draws the same frames.
         self._generator.bit_generator.state = state
 
     def pixels(self) -> FloatArray:
@@ -74,7 +76,9 @@ class FrameNoise:
 
     def _line(self, length: int, level: FloatArray) -> FloatArray:
         white = self._generator.standard_normal((1, length, 3), np.float32)
+        # To OpenCV a sigmaY of 0 would mean sigmaX.
         line = cv2.GaussianBlur(white, (0, 0), _LINE_BLUR_PX, sigmaY=1e-3, borderType=cv2.BORDER_REFLECT)[0]
+        # A Gaussian blur of width s leaves white noise a variance of 1 / (2·√π·s); the root restores it to 1.
         return (line * (level * np.float32(np.sqrt(2.0 * np.sqrt(np.pi) * _LINE_BLUR_PX)))).astype(np.float32)
 
 
@@ -90,6 +94,7 @@ class Drift:
         self._scale[:, 0, 0] = levels.offset
         self._scale[:, 0, 1:], self._scale[:, 1:, 0] = along, down
         self._scale[:, 1:, 1:] = np.sqrt(down[:, :, None] * along[:, None, :]) * (_falling(_DRIFT_ALONG, -2.0) / 2.0)
+        # Begins with its full spread, so that the first frames drift as later ones do.
         self._state = self._innovation()
         self._at_s: float | None = None
         self.field = self._draw()
@@ -102,6 +107,7 @@ class Drift:
         if passed_s < DRIFT_STEP_S:
             return False
         kept = np.exp(-passed_s / DRIFT_TIME_S)
+        # The two squared factors add up to 1: the variance stays the same however long the step.
         self._state = kept * self._state + np.sqrt(1.0 - kept**2) * self._innovation()
         self._at_s = now_s
         self.field = self._draw()
@@ -109,11 +115,13 @@ class Drift:
 
     def _innovation(self) -> FloatArray:
         """Normal deviates whose common size varies: now and then all of the light changes at once."""
+        # Log-normal with a mean square of 1: bursts change the distribution and not the level.
         size = np.exp(_BURSTS * self._generator.standard_normal() - _BURSTS**2)
         return (self._generator.standard_normal(self._scale.shape) * size * self._scale).astype(np.float32)
 
     def _draw(self) -> FloatArray:
         height, width = SENSOR_SHAPE
+        # The shortest wave has five of the coarse points, enough to interpolate between them.
         coarse = cosine_field(self._state.astype(np.float32), _DRIFT_SHAPE)
         return np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
 

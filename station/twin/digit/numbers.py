@@ -45,6 +45,7 @@ class Fitted:
     def load(cls) -> "Fitted":
         """Read the committed file."""
         with files("station.twin.digit").joinpath(FILE).open("rb") as file, np.load(file) as archive:
+            # The background's coefficients are stored as float16, which is too coarse to compute with.
             numbers: dict[str, Any] = {name: archive[name].astype(np.float32) for name in archive.files}
         noise = NoiseLevels(**{name: numbers.pop(f"noise_{name}") for name in NoiseLevels.__dataclass_fields__})
         return cls(**dict[str, Any]({**numbers, "smoothing_mm": float(numbers["smoothing_mm"]), "noise": noise}))

@@ -45,6 +45,7 @@ def slope_basis(slope_x: FloatArray, slope_y: FloatArray) -> FloatArray:
     """
     size, angle = np.hypot(slope_x, slope_y), np.arctan2(slope_y, slope_x)
     knots = np.asarray(SLOPE_KNOTS)
+    # In the knots' numbers the uneven knots are evenly spaced, so that two neighbouring rings add up to 1.
     position = np.interp(size, knots, np.arange(knots.size))
     rings = [np.maximum(0.0, 1.0 - np.abs(position - ring)) for ring in range(1, knots.size)]
     waves = [np.ones_like(angle)]
@@ -61,8 +62,10 @@ def slopes(dent: FloatArray, smoothing_mm: float, grid_mm: float = GRID_MM) -> t
         smoothing_mm: standard deviation of the smoothing.
         grid_mm: from one of the grid's points to the next.
     """
+    # OpenCV's default border mirrors the dent, which would flatten a contact that the image's border cuts.
     smooth = cv2.GaussianBlur(dent, (0, 0), smoothing_mm / grid_mm, borderType=cv2.BORDER_REPLICATE)
     scale = 1.0 / (2.0 * grid_mm)
+    # filter2D correlates, it does not mirror the kernel: right less left, and below less above.
     slope_x = cv2.filter2D(smooth, cv2.CV_32F, np.array([[-scale, 0.0, scale]]), borderType=cv2.BORDER_REPLICATE)
     slope_y = cv2.filter2D(smooth, cv2.CV_32F, np.array([[-scale], [0.0], [scale]]), borderType=cv2.BORDER_REPLICATE)
     return np.asarray(slope_x, np.float32), np.asarray(slope_y, np.float32)
@@ -90,6 +93,7 @@ class Optics:
         axis = np.linspace(-_TABLE_REACH, _TABLE_REACH, _TABLE_SIDE, dtype=np.float32)
         slope_x, slope_y = np.meshgrid(axis, axis)
         basis = slope_basis(slope_x, slope_y)
+        # The basis is summed once: a frame then only reads six tables, one for each term of the place, at its slopes.
         self._tables = np.einsum("kdyx,kdpc->pyxc", basis, table).astype(np.float32)
         # Repeated for each channel: OpenCV's sum of products takes no broadcasting, and is ten times faster.
         self._places = np.repeat(grid_places()[..., None], 3, axis=-1)
@@ -108,6 +112,7 @@ class Optics:
         slope_x, slope_y = slopes(dent, self._smoothing_mm, self._grid_mm)
         size = cv2.magnitude(slope_x, slope_y)
         steep = size > SLOPE_KNOTS[0]
+        # Only the box around the steep part is computed: a contact mostly covers a part of the image.
         rows, columns = np.flatnonzero(steep.any(axis=1)), np.flatnonzero(steep.any(axis=0))
         if rows.size:
             box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
@@ -119,10 +124,12 @@ class Optics:
     def _tables_at(self, slope_x: FloatArray, slope_y: FloatArray, size: npt.NDArray, places: FloatArray) -> FloatArray:
         """Interpolate each place's table at the slopes and add up; slopes beyond the table count as its rim."""
         scale = (_TABLE_SIDE - 1) / (2 * _TABLE_REACH)
+        # Just inside the rim, where rounding would mix in the zeros that remap finds beyond it.
         within = np.minimum(1.0, (_TABLE_REACH * 0.999) / np.maximum(size, 1e-9)).astype(np.float32)
         map_x = (slope_x * within + _TABLE_REACH) * np.float32(scale)
         map_y = (slope_y * within + _TABLE_REACH) * np.float32(scale)
         total = np.zeros((*size.shape, 3), np.float32)
         for table, place in zip(self._tables, places, strict=True):
             cv2.accumulateProduct(cv2.remap(table, map_x, map_y, cv2.INTER_LINEAR), place, total)
+        # Interpolation carries the table's first values down to slope 0; below the first knot nothing may change.
         return np.asarray(cv2.copyTo(total, (size > SLOPE_KNOTS[0]).astype(np.uint8)), np.float32)

@@ -104,6 +104,7 @@ class DigitSensor:
         if redraw:
             self._dent, self._condition = dent, condition
             self._clean = self._draw(dent, condition)
+        # Advanced first: behind `redraw or` the drift would not advance while the fingers close.
         if self._drift.advance(now_s) or redraw:
             self._base = self._drifted()
         image = self._noisy()
@@ -111,6 +112,7 @@ class DigitSensor:
 
     def _noisy(self) -> Image:
         if not self._noise_factor:
+            # convertScaleAbs rounds and saturates, but makes negative values positive.
             return np.asarray(cv2.convertScaleAbs(np.maximum(self._base, 0.0)), np.uint8)
         factor = np.float32(self._noise_factor)
         columns, rows = self._noise.columns() * factor, self._noise.rows() * factor
@@ -129,6 +131,7 @@ class DigitSensor:
         return np.asarray(cv2.scaleAdd(self._drift.field, self._drift_factor, self._clean), np.float32)
 
     def _draw(self, dent: FloatArray | None, condition: Condition) -> FloatArray:
+        # Made anew for each drawing, so that debris and tear stay in their places.
         generator = np.random.default_rng([self._seed, 5])
         pressed = dent  # without the debris, which is there in the reference too
         if condition.dirt:
@@ -149,6 +152,7 @@ class DigitSensor:
             image *= np.asarray(condition.light, np.float32)
         if condition.dead_led:
             image[..., _CHANNEL[condition.dead_led]] *= _DEAD_LED_REST
+        # The lens is last in the light's way: its fog blurs all that was drawn before.
         if condition.fog:
             blurred = cv2.GaussianBlur(image, (0, 0), _FOG_BLUR_PX * condition.fog)
             image = blurred * (1.0 - 0.7 * condition.fog) + blurred.mean() * 0.7 * condition.fog

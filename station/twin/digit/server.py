@@ -22,6 +22,7 @@ from station.twin.world import Touch, World
 
 FRAMES_PER_S = 30.0
 GEL_FAULTS = ("gel_torn", "gel_worn", "led_dead", "lens_fogged", "dirt")
+# Three seconds of frames, and so the longest delay that the fault `delayed` can make.
 _REMEMBERED = 90
 _BRIGHTEST = 15
 _DEAD: dict[int, Colour] = {1: "red", 2: "green", 3: "blue"}
@@ -142,11 +143,13 @@ class DigitCameraServer:
                 await self._draw()
                 failing = False
             except Exception:  # noqa: BLE001 (whatever it is, the next frame is tried)
+                # Once for a row of failures: 30 entries a second would fill the log.
                 if not failing:
                     _LOG.exception("the twin's camera could not draw frame %d; it goes on", self._sequence)
                 failing = True
             while (wait_s := due_s + self._period_s() - loop.time()) > 0:
                 await asyncio.sleep(min(wait_s, _SLICE_S))
+            # After a pause, as without a client, frames are not made up for in a burst.
             due_s = max(due_s + self._period_s(), loop.time() - 1.0 / FRAMES_PER_S)
 
     async def _draw(self) -> None:
@@ -165,14 +168,17 @@ class DigitCameraServer:
 
     async def _capture(self) -> _Captured:
         self._sequence += 1
+        # Read before the drawing, which takes milliseconds: the frame and its truth are of this moment.
         now_s, touch, last = self._clock.now_s(), self._world.touch(), self._newest()
         if last and self.faults.active(CommonFault.STUCK):
             return _Captured(self._sequence, now_s, last.image, last.touch, last.footprint)
         if touch is None:
             footprint = None
         elif last and last.touch == touch:
+            # The same array again: by that the sensor recognises that its clean image is still valid.
             footprint = last.footprint
         else:
+            # In a thread: the loop also runs the arm's cycle of 2 ms, which the drawing would delay.
             footprint = await asyncio.to_thread(touch.contact.pressed, touch.squeezed)
         dent = footprint.dent if footprint else None
         image = await asyncio.to_thread(self._sensor.frame, dent, now_s, self._condition())
@@ -208,6 +214,7 @@ class DigitCameraServer:
         self._clients.add(task)
         try:
             async with asyncio.TaskGroup() as group:
+                # Its error cancels the serving beside it, so that a fault cuts the connection at once.
                 guard = group.create_task(self._cut())
                 await self._serve(reader, writer)
                 guard.cancel()
@@ -236,6 +243,7 @@ class DigitCameraServer:
             await asyncio.sleep(0.02)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        # A client that sends nothing would hold its connection for ever.
         async with asyncio.timeout(_REQUEST_DEADLINE_S):
             request = await read_request(reader)
         match request.get("kind"):
@@ -279,6 +287,7 @@ class DigitCameraServer:
             return self._garbage.bytes(4096)
         image = captured.image
         if self.faults.active(CommonFault.WRONG):
+            # `cast` below needs contiguous memory, which a strided view has not.
             image = np.ascontiguousarray(image[::2, ::2])
         return packed(
             "frame",
@@ -318,4 +327,5 @@ class DigitCameraServer:
 
 def _within(low: float, amount: float, high: float) -> float:
     """An amount inside its limits; the low one where it is no number."""
+    # The order of the arguments matters: max returns its first where the other is NaN.
     return min(high, max(low, amount))

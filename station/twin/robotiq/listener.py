@@ -66,6 +66,7 @@ class Listener(ABC):
 
     async def _open(self) -> None:
         self._server = await asyncio.start_server(self._accept, self.host, self.port)
+        # A port found for 0 stays the same one after a fault: the clients have its number.
         self.port = self._server.sockets[0].getsockname()[1]
 
     async def _close(self) -> None:

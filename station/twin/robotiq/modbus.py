@@ -44,6 +44,7 @@ class RtuSerialServer:
     async def start(self) -> None:
         """Open the line. The far end is held open too, so that the line outlives its users."""
         near, far = pty.openpty()
+        # As opened it is a console's line, which echoes and translates bytes.
         tty.setraw(far)
         os.set_blocking(near, False)
         self.path = os.ttyname(far)
@@ -63,6 +64,7 @@ class RtuSerialServer:
         self._ends = self._answering = None
 
     def _readable(self, near: int) -> None:
+        # Read also while the gripper is gone: what stays in the line would be answered afterwards.
         data = os.read(near, LONGEST_FRAME)
         if self._gripper.faults.gone(self._gripper.clock.now_s()):
             return

@@ -99,6 +99,7 @@ class RobotiqGripper:
     def write(self, command: Command) -> None:
         """Take a command; gOBJ is cleared before this returns where it requests another motion."""
         now_s = self.clock.now_s()
+        # The time up to now belongs to the command before.
         self._advance(now_s)
         before = self._command
         if self.faults.active(CommonFault.STUCK) or command == before:
@@ -133,6 +134,7 @@ class RobotiqGripper:
         first = address - COMMAND_ADDRESS
         if first < 0 or first + len(values) > REGISTERS:
             raise KeyError(address)
+        # Registers that this write leaves out retain their values.
         words = [*self._command.words(), *[0] * REGISTERS][:REGISTERS]
         words[first : first + len(values)] = values
         self.write(Command.from_words(words))
@@ -170,6 +172,7 @@ class RobotiqGripper:
         remaining_s = now_s - self._now_s
         if remaining_s <= 0:
             return
+        # Time passes for stuck fingers too: they do not catch up once the fault is off.
         self._now_s = now_s
         if self.faults.active(CommonFault.STUCK):
             return
@@ -211,10 +214,12 @@ class RobotiqGripper:
     def _go_to(self, duration_s: float) -> None:
         command = self._command
         leg = _Leg(self._fingers.opening_mm(command.position), speed_mm_s(command.speed), grip_force_n(command.force))
+        # What was held is gone: the gripper then reports 3, while its fingers go on.
         if self._object != _Object.MOVING and self._resistance_n(leg, self._opening_mm) <= 0:
             self._object = _Object.AT_POSITION
         closing = leg.target_mm < self._opening_mm
         arrived = self._travel(leg, duration_s) > 0
+        # Exact, since a leg without contact ends at the target itself.
         if arrived and self._opening_mm == leg.target_mm:
             self._object = _Object.AT_POSITION
         elif arrived:
@@ -243,9 +248,11 @@ class RobotiqGripper:
             return None
         if self._holds(leg, free_mm):
             return free_mm
+        # The load may be any function of the opening: sampled for the first contact, which bisection then refines.
         steps = int(abs(goal_mm - free_mm) / _PROBE_MM) + 1
         start_mm = free_mm
         for step in range(1, steps + 1):
+            # Counted back from the goal, so that the last step is the goal to the bit.
             held_mm = goal_mm + (start_mm - goal_mm) * (steps - step) / steps
             if self._holds(leg, held_mm):
                 while abs(held_mm - free_mm) > _CONTACT_MM:

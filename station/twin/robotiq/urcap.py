@@ -51,6 +51,7 @@ class UrcapServer(Listener):
         changes: dict[str, Any] = {}
         for name, text in zip(words[::2], words[1::2], strict=False):
             field = _WRITABLE.get(name)
+            # The length is checked before int(), which raises ValueError for thousands of digits.
             if field is None or not text.isdecimal() or len(text) > _LONGEST_NUMBER or int(text) > _LARGEST[field]:
                 return _NONSENSE
             changes[field] = bool(int(text)) if _LARGEST[field] == 1 else int(text)
@@ -60,6 +61,7 @@ class UrcapServer(Listener):
         return b"ack"
 
     def _get(self, name: str) -> bytes:
+        # POS is in both: GET reads where the fingers are, and PRE what was requested.
         if name in _READ_ONLY:
             value = int(getattr(self._gripper.status(), _READ_ONLY[name]))
         elif name in _WRITABLE:

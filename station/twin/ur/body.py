@@ -49,8 +49,10 @@ class Body:
         passed_s, self._now_s = now_s - self._now_s, now_s
         if self._path is None or self._profile is None:
             return
+        # The scaling stretches time, so that a slowed arm goes exactly the same way.
         self._elapsed_s += passed_s * scaling
         self._travel, self._speed = self._profile.at(self._elapsed_s)
+        # A gentle braking near the end would carry beyond the path.
         self._travel = min(self._travel, self._path.length)
         self.joints_rad, (s1, s2, s3, s4, s5, s6) = self._path.at(self._travel)
         pace = self._speed * scaling
@@ -87,6 +89,7 @@ class Body:
 
     def pause(self, deceleration_rad_s2: float) -> None:
         """Brake as `brake`, and remember the motion for `resume`."""
+        # Before the braking, which forgets it.
         motion = self._motion if self.moving else None
         self.brake(deceleration_rad_s2)
         self._paused = motion
@@ -107,6 +110,7 @@ class Body:
     def tool_pose(self) -> Pose:
         """The tool centre point in the base's frame."""
         joints, offset = self.joints_rad, self.tcp_offset
+        # Identity is enough: joints and offset are replaced, never changed in place.
         if self._tool_cache is None or self._tool_cache[0] is not joints or self._tool_cache[1] is not offset:
             self._tool_cache = joints, offset, self.forward(joints, offset)
         return self._tool_cache[2]
@@ -137,9 +141,11 @@ class Body:
 
     def _come_to_rest(self, pace: float, deceleration: float) -> None:
         self._motion = self._paused = None
+        # A motion that has not left its start has no speed to brake from, and is dropped.
         if self._path is None or self._speed == 0.0:
             self._rest()
             return
+        # The deceleration may have another unit than the path (rad or m), so that it only sets the time to rest.
         duration_s = max(pace / deceleration, SHORTEST_BRAKING_S)
         self._profile = Braking(self._travel, self._speed, self._speed / duration_s)
         self._elapsed_s = 0.0

@@ -113,6 +113,7 @@ class UrController:
         self.inputs_outputs = InputsOutputs()
         self.safety = Safety(running=running)
         self.script = ControlScript(self.body, self.registers, self.safety)
+        # The table's getters are bound to the objects above, and are replaced with them.
         self.outputs = output_table(self)
         self._dashboard = Dashboard(self)
 
@@ -174,6 +175,7 @@ class UrController:
             self._timer.cancel()
             self._timer = None
         if self._switching is not None:
+            # A switch under way would open the ports again after they are closed.
             await self._switching
         await self.network.close()
 
@@ -181,16 +183,19 @@ class UrController:
         loop = asyncio.get_running_loop()
         self._due_s += CYCLE_S
         late_s = loop.time() - self._due_s
+        # Fewer late cycles are made up for in a row, so that clients get their 500 packages a second.
         if late_s > LATE_CYCLES * CYCLE_S:
             self._due_s = loop.time()
         if late_s > _STOOD_STILL_S:
             self.script.stood_still(self.clock.now_s())
+        # Before the cycle's work: an error in it does not end the controller.
         self._timer = loop.call_at(self._due_s, self._cycle)
         now_s = self.clock.now_s()
         self._apply_faults(now_s)
         if not self.faults.active(CommonFault.STUCK):
             self.safety.advance(now_s)
             self.body.advance(now_s, self.speed_scaling)
+            # Last, so that the script sees an arrival or a stop in the cycle in which it happens.
             self.script.step(now_s)
         self._tick += 1
         for connection in list(self.network.connections):
@@ -207,9 +212,11 @@ class UrController:
             self.network.cut()
         if self._switching is not None and self._switching.done():
             self._switching = None
+        # The ports are being opened or closed; what is switched meanwhile is taken afterwards.
         if self._switching is not None:
             return
         faults, begun = self.faults.snapshot().keys(), self.faults.take_new()
+        # A fault that was switched on and off between two cycles has begun and ended in this one.
         ended = (self._known_faults | begun) - faults
         if not begun and not ended:
             return
@@ -240,6 +247,7 @@ class UrController:
             self.safety.power_off()
 
     async def _switch_network(self, *, on: bool) -> None:
+        # Also before an opening: a fault that was on for less than a cycle still cuts every connection.
         await self.network.close()
         if on:
             with contextlib.suppress(OSError):

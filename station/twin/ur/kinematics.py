@@ -77,15 +77,19 @@ def inverse(flange: Transform) -> npt.NDArray[np.float64]:
     branches = np.array([[s1, s5, s3] for s1 in (1, -1) for s5 in (1, -1) for s3 in (1, -1)], dtype=np.float64)
     shoulder, wrist, elbow = branches.T
     target = np.broadcast_to(flange[:, None], (count, 8, 4, 4))
+    # Branches without a solution become NaN on purpose.
     with np.errstate(invalid="ignore", divide="ignore"):
+        # Where the axes of wrist 2 and 3 meet: neither of them moves this point.
         centre = target[..., :3, 3] - D6_M * target[..., :3, 2]
         radius = np.hypot(centre[..., 0], centre[..., 1])
         q1 = np.arctan2(centre[..., 1], centre[..., 0]) + shoulder * np.arccos(_cosine(D4_M / radius)) + math.pi / 2
         s1, c1 = np.sin(q1), np.cos(q1)
+        # The flange's distance to the plane of the upper arm is D4 + D6·cos(q5).
         reach = target[..., 0, 3] * s1 - target[..., 1, 3] * c1
         q5 = wrist * np.arccos(_cosine((reach - D4_M) / D6_M))
         s5 = np.sin(q5)
         x_axis, y_axis = target[..., :3, 0], target[..., :3, 1]
+        # Divided by s5 for its sign: between the two wrist branches q6 differs by half a turn.
         q6 = np.arctan2(
             (-y_axis[..., 0] * s1 + y_axis[..., 1] * c1) / s5, (x_axis[..., 0] * s1 - x_axis[..., 1] * c1) / s5
         )
@@ -95,7 +99,9 @@ def inverse(flange: Transform) -> npt.NDArray[np.float64]:
         x, y = wrist_1[..., 0, 3], wrist_1[..., 1, 3]
         distance = np.hypot(x, y)
         q3 = elbow * np.arccos(_cosine((distance**2 - A2_M**2 - A3_M**2) / (2 * A2_M * A3_M)))
+        # Universal Robots' arm lengths are negative: the arm extends along -x, hence the signs.
         q2 = np.arctan2(-y, -x) - np.arcsin(_cosine(-A3_M * np.sin(q3) / distance))
+        # The three axes are parallel, so that their angles add up.
         turned = np.arctan2(wrist_1[..., 1, 0], wrist_1[..., 0, 0])
         q4 = turned - q2 - q3
     solutions = np.stack([q1, q2, q3, q4, q5, q6], axis=-1)
@@ -115,6 +121,7 @@ def nearest(solutions: npt.NDArray[np.float64], near_rad: npt.ArrayLike) -> Join
     turned = usable + 2 * math.pi * np.round((near - usable) / (2 * math.pi))
     outside = np.abs(turned) > JOINT_RANGE_RAD + ROUNDING
     turned = np.where(outside, turned - 2 * math.pi * np.sign(turned), turned)
+    # By the joint with the longest way, which is the length of a joint motion.
     best = turned[np.abs(turned - near).max(axis=-1).argmin()]
     q1, q2, q3, q4, q5, q6 = best.tolist()
     return q1, q2, q3, q4, q5, q6

@@ -97,6 +97,7 @@ class Network:
             await self._say(writer, primary.version_message(self._controller))
             while not taking.done():
                 await self._say(writer, primary.robot_mode_message(self._controller))
+                # A pause that ends at once when the client has gone.
                 await asyncio.wait({taking}, timeout=primary.PERIOD_S)
 
     async def _take_programs(self, reader: asyncio.StreamReader) -> None:

@@ -108,6 +108,7 @@ def output_table(controller: "UrController") -> dict[str, tuple[str, Getter]]:
         "runtime_state": ("UINT32", lambda: (script.runtime_state.value,)),
         "robot_status_bits": (
             "UINT32",
+            # RTDE guide: bit 0 for power on, bit 1 for a program that runs.
             lambda: (safety.powered | (script.runtime_state is RuntimeState.PLAYING) << 1,),
         ),
         "safety_status_bits": ("UINT32", lambda: (safety.bits,)),

@@ -10,6 +10,7 @@ from station.twin.ur.poses import Transform, rotation_from_vector, vector_from_r
 
 SAMPLE_M = 0.001
 MOST_SAMPLES = 500
+# Of a joint between two samples: a larger step is a change of the solution's branch, as at a singularity.
 JUMP_RAD = 0.5
 
 
@@ -65,6 +66,7 @@ class ToolPath:
         flanges[:, :3, :3] = [start[:3, :3] @ rotation_from_vector(fraction * turn) for fraction in fractions]
         self._joints = _follow(start_joints, inverse(flanges))
         self._pieces = pieces
+        # It divides: a way of no length has pieces of 1.0, on which every slope is 0.
         self._piece = self.length / pieces or 1.0
 
     @property
@@ -97,6 +99,7 @@ def _along(start: Joints, slope: Joints, travel: float) -> Joints:
 
 
 def _follow(start_joints: Joints, solutions: np.ndarray) -> list[Joints]:
+    # From where the joints are, since several solutions bring the flange there.
     joints = [start_joints]
     for place in solutions[1:]:
         found = nearest(place, joints[-1])

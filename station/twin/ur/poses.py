@@ -41,6 +41,7 @@ def vector_from_rotation(rotation: npt.NDArray[np.float64]) -> npt.NDArray[np.fl
         w, x, y, z = r[0][2] - r[2][0], r[0][1] + r[1][0], 1 + squares[2], r[1][2] + r[2][1]
     else:
         w, x, y, z = r[1][0] - r[0][1], r[0][2] + r[2][0], r[1][2] + r[2][1], 1 + squares[3]
+    # A quaternion and its negative are one rotation; with w of 0 or more its angle is pi at most.
     if w < 0:
         w, x, y, z = -w, -x, -y, -z
     length = math.sqrt(x * x + y * y + z * z)

@@ -35,6 +35,7 @@ def robot_mode_message(controller: "UrController") -> bytes:
     return ROBOT_MODE.pack(
         ROBOT_MODE.size,
         16,
+        # The sub-package: all but the message's own size and type.
         ROBOT_MODE.size - 5,
         0,
         controller.timestamp_us,

@@ -22,12 +22,14 @@ class Trapezoid:
     @property
     def peak_speed(self) -> float:
         """The highest speed that is reached."""
+        # At most half the way is for speeding up: v² = 2·a·(d/2).
         return min(self.speed, math.sqrt(self.distance * self.acceleration))
 
     @property
     def duration_s(self) -> float:
         """Time from rest to rest."""
         peak = self.peak_speed
+        # The way at full speed, and for each ramp half of its time more.
         return 0.0 if peak == 0 else self.distance / peak + peak / self.acceleration
 
     def at(self, elapsed_s: float) -> tuple[float, float]:

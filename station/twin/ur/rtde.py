@@ -23,6 +23,7 @@ LEAST_FREQUENCY_HZ = 1.0
 LARGEST_PACKAGE_BYTES = 65535
 """A package's size field has 16 bits."""
 SLOW_READER_S = 10.0
+# With the kernel's larger buffer a client that does not read would be noticed much later.
 SEND_BUFFER_BYTES = 32768
 HEADER = struct.Struct(">HB")
 PROTOCOL_VERSION = 2
@@ -139,6 +140,7 @@ class RtdeConnection(asyncio.Protocol):
         self._buffer += data
         while len(self._buffer) >= HEADER.size:
             size, kind = HEADER.unpack_from(self._buffer)
+            # A size of 0 would take nothing from the buffer, and this loop would never end.
             if size < HEADER.size:
                 self.cut()
                 return

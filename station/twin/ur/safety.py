@@ -93,6 +93,7 @@ class Safety:
         """Begin to power the joints; False where the safety system forbids it."""
         if self._emergency or self._faulty:
             return False
+        # A second order while the power comes on must not begin it anew.
         if not self.powered and self._target is RobotMode.POWER_OFF:
             self.robot_mode, self._target = RobotMode.POWER_ON, RobotMode.IDLE
             self._reached_at_s = now_s + POWER_ON_S

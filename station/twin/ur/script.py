@@ -84,6 +84,7 @@ class ControlScript:
             60: lambda: self._say(self._body.solve(self._pose()) is not None),
             61: lambda: self._say(self._body.solve(self._pose(), self._joints(6)) is not None),
         }
+        # The script answers these in every cycle and stays ready: their client waits for no DONE.
         self._realtime = {26, 27, 38, 58}
 
     def upload(self, now_s: float) -> None:
@@ -152,6 +153,7 @@ class ControlScript:
             self.runtime_state, self._resumes = RuntimeState.PAUSED, True
             self._body.pause(SAFETY_BRAKE_RAD_S2)
         if self._safety.safety_mode is not SafetyMode.SAFEGUARD_STOP:
+            # After a safeguard stop alone the motion continues by itself; any other stop ends the program.
             self._resumes = False
         if not self._safety.powered or not self._safety.remote:
             self.end("the arm lost its power" if self._safety.remote else "the controller was put into local control")
@@ -168,6 +170,7 @@ class ControlScript:
             self._registers.output_int[0] = READY
         elif command in self._realtime:
             self._commands[command]()
+        # A command stays in its register until the client clears it: it is begun once.
         elif not self._executing:
             self._executing = True
             self._watched_since_s = now_s
@@ -189,6 +192,7 @@ class ControlScript:
         start()
         if self._registers.input_int(1) != 1:
             return lambda: not self._body.moving
+        # After the start: where that raises, the script ends and no motion is reported as running.
         self._report(0)
         self._async_running = True
         return None
