@@ -12,8 +12,10 @@ from station.settings.recipe import load_recipes
 from station.vocabulary import Flag, OutcomeName, Reason
 
 RECIPE = load_recipes()["strawberry"]
-_SOUND, _DAMAGED = (24.0, 26.0, 28.0), (45.0, 75.0, 95.0)
-"""Growth of the contact area with the closing, mm² per mm. Few, so that presses repeat and are judged from a cache."""
+SOUND, DAMAGED = (26.0, 28.0, 30.0), (45.0, 75.0, 95.0)
+"""Growth of the contact area with the closing, mm² per mm: those that pass by the recipe, and those that do not.
+
+Few, so that presses repeat and are judged from a cache."""
 _WIDTHS_MM = (28.0, 35.0, 42.0)
 _PX_MM2 = 1400.0
 DAMAGED_SHARE, NONE_SHARE, OFF_MIDDLE_SHARE = 0.2, 0.02, 0.1
@@ -32,7 +34,7 @@ class Fruit(NamedTuple):
 def draw_fruit(number: int, rng: random.Random) -> Fruit:
     """Draw a fruit: sound, damaged, or none at all."""
     place = rng.random()
-    kinds = _DAMAGED if place < DAMAGED_SHARE else _SOUND
+    kinds = DAMAGED if place < DAMAGED_SHARE else SOUND
     growth = 0.0 if place > 1 - NONE_SHARE else rng.choice(kinds)
     return Fruit(number, rng.choice(_WIDTHS_MM), growth, rng.random() < OFF_MIDDLE_SHARE)
 

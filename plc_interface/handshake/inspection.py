@@ -4,15 +4,12 @@ from collections.abc import Callable
 
 from plc_interface.handshake.actions import RequestBegin, RequestOutcome
 from plc_interface.handshake.events import BeginAnswered, Moment
-from plc_interface.handshake.journal import Running
+from plc_interface.handshake.journal import MOST_DISOWNED, Running
 from plc_interface.handshake.modes import Inspection, Signal
 from plc_interface.handshake.outcomes import is_sound, no_result, publish_if_other, publish_own, queue
 from plc_interface.handshake.trigger import note_refusal
 from plc_interface.handshake.work import Work, described, row
 from station.channel.line import BeginReply, Reason, Refusal, StationState
-
-MOST_DISOWNED = 8
-"""Maximum number of refused ids that the station may still begin; the oldest is dropped. An estimate."""
 
 
 def request_begin(work: Work) -> None:

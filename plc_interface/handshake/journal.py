@@ -7,6 +7,8 @@ from station.channel.line import Outcome
 from station.vocabulary import LONGEST_LOT
 
 COMMAND_RESULT = BY_NAME["command_result"]
+MOST_DISOWNED = 8
+"""Maximum number of refused ids that the station may still begin; the oldest is dropped. An estimate."""
 
 
 class _Persistent(BaseModel):

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from plc_interface.handshake.actions import RequestBegin
 from plc_interface.handshake.events import Inputs, Moment
-from plc_interface.handshake.journal import COMMAND_RESULT, Journal, Running
+from plc_interface.handshake.journal import COMMAND_RESULT, MOST_DISOWNED, Journal, Running
 from plc_interface.handshake.modes import Arming, Command, Inspection, Link, Lot, Mode, Result, Service, Signal, Trigger
 from plc_interface.registers.map import QUEUE_PLACES
 from station.channel.line import Outcome, Refusal, StationState

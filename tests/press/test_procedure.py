@@ -249,6 +249,47 @@ def test_a_press_that_is_called_off_releases():
     assert rig.verbs[-1] == "release after a fault"
 
 
+def test_a_press_that_a_defect_ends_releases():
+    rig, observer = WrittenRig(), WrittenObserver()
+
+    async def see_step(step: Step) -> bool:
+        raise ValueError("no StationError")
+
+    observer.see_step = see_step
+    with pytest.raises(ValueError, match="no StationError"):
+        asyncio.run(press(rig, BLUEBERRY, observer))
+    assert rig.verbs[-1] == "release"
+
+
+@pytest.mark.parametrize("cancelled_before", [True, False])
+def test_a_release_comes_to_its_end_also_where_it_is_called_off_again(cancelled_before):
+    rig, releasing, free = WrittenRig(), asyncio.Event(), asyncio.Event()
+    observer = WrittenObserver(most=100 if cancelled_before else 1)
+
+    async def release(failed: Any = None) -> None:
+        releasing.set()
+        await free.wait()
+        rig.verbs.append("released")
+
+    async def scenario() -> None:
+        rig.release = release
+        pressing = asyncio.ensure_future(press(rig, BLUEBERRY, observer))
+        while not observer.steps:
+            await asyncio.sleep(0)
+        if cancelled_before:
+            pressing.cancel()
+        await releasing.wait()
+        pressing.cancel()
+        await asyncio.sleep(0)
+        assert not pressing.done()
+        free.set()
+        await asyncio.wait({pressing})
+        assert pressing.cancelled() is cancelled_before
+
+    asyncio.run(scenario())
+    assert rig.verbs[-1] == "released"
+
+
 def test_the_last_step_is_the_recipes_the_force_limits_or_that_of_closed_fingers():
     number, free, held = BLUEBERRY.steps.number, Position(10.0), Position(10.0, held=True)
     assert not is_last_step(BLUEBERRY, number - 1, 1.0, free)

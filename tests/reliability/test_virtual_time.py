@@ -3,11 +3,13 @@
 import logging
 from collections.abc import Iterator
 from dataclasses import replace
+from random import Random
 from typing import Any
 
 import pytest
 
 from benchmarks.virtual import actions, interface, laws
+from benchmarks.virtual import inspection as fruit
 from benchmarks.virtual.play import play
 from benchmarks.virtual.story import Story, Trouble, draw, shrink
 from plc_interface.handshake import inputs, inspection
@@ -38,6 +40,15 @@ def quiet() -> Iterator[None]:
     logging.disable(logging.CRITICAL)
     yield
     logging.disable(logging.NOTSET)
+
+
+@pytest.mark.parametrize(("growths", "passes"), [(fruit.SOUND, True), (fruit.DAMAGED, False)])
+def test_sound_fruit_pass_where_nothing_is_wrong_and_damaged_ones_do_not(growths, passes):
+    for growth in growths:
+        laid = fruit.Fruit(1, 35.0, growth, off_middle=False)
+        points = tuple(fruit.point(laid, float(closing_mm), None, Random(1)) for closing_mm in range(4))
+        press = Press(35.0, 0.4, points, resolution_mm=0.4)
+        assert (fruit.judged(press).outcome == "PASS") is passes, growth
 
 
 def test_laws_hold_over_a_thousand_triggers():
@@ -88,7 +99,7 @@ def test_an_acknowledgement_that_the_journal_lacks_doubles_no_outcome(monkeypatc
             save(self, journal)
 
     monkeypatch.setattr(interface.Interface, "_save", refused)
-    troubles = (Trouble("disk", "full", 57.112, 0.234), Trouble("interface", "kill", 57.344, 0.743))
+    troubles = (Trouble("disk", "full", 51.2, 0.234), Trouble("interface", "kill", 51.432, 0.743))
     assert play(Story(seed=7, fruits=30, troubles=troubles, carries=False)).broken is None
     monkeypatch.setattr(inputs, "take_unwritten", lambda *_: None)
     broken = play(Story(seed=7, fruits=30, troubles=troubles, carries=False)).broken

@@ -155,6 +155,7 @@ def test_bad_usage_is_told(tmp_path: Path, arguments: tuple[object, ...], told: 
             {"fruit": "strawberry", "method": "paper"},
             "fruit strawberry in place of blueberry, method paper in place of",
         ),
+        ({"seed": 6, "method": "paper", "measured_by": "0"}, "method paper in place of robust, seed 6 in place of 5)"),
         ({}, "another version of the program"),
         ({"seed": "five"}, "is not a study's"),
     ],

@@ -28,7 +28,8 @@ from station.whatif.limits import (
     marked_fruit,
     rate_interval,
 )
-from station.whatif.proposal import proposals_of
+from station.whatif.proposal import Proposal, proposals_of
+from station.whatif.threshold_draft import draft_recipe
 
 AREAS = st.lists(st.floats(1, 200), min_size=1, max_size=60).map(np.array)
 COSTS = Costs(false_accept=20, damaged_share=0.05)
@@ -424,6 +425,38 @@ def test_a_limit_at_another_closing_has_the_least_area_of_there(orchard, station
     (area,) = load_recipe(proposed).damage.area
     assert (area.closing_mm, area.least_area_mm2) == (1.5, 15.5)
     assert 23 < area.area_mm2 < 38
+
+
+@pytest.mark.parametrize(
+    ("closing_mm", "closings_mm"),
+    [
+        (0.5, [0.5, 2, 3, 4]),
+        (1.5, [1, 1.5, 3, 4]),
+        (2.5, [1, 2, 2.5, 4]),
+        (3, [1, 2, 3, 4]),
+        (3.5, [1, 2, 3, 3.5]),
+        (5, [1, 2, 3, 5]),
+    ],
+)
+def test_a_draft_of_several_limits_has_the_proposed_one_in_its_order(changed, tmp_path, closing_mm, closings_mm):
+    recipe = find_recipe("strawberry")
+    first = recipe.damage.area[0]
+    limits = [first.model_copy(update={"closing_mm": mm, "area_mm2": 60.0 + 10 * mm}) for mm in (1.0, 2.0, 3.0, 4.0)]
+    recipe = changed(
+        recipe,
+        steps__result_closings_mm=[0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4, 5],
+        damage__area=[each.model_dump() for each in limits],
+        damage__decided_by="every_limit",
+        early_stop__area_mm2=150.0,
+    )
+    (tmp_path / "strawberry.yaml").write_text(recipe.model_dump_json())
+    assert recipe.damage.size is not None
+    exponent, limit_mm2 = recipe.damage.size.exponent, 61.0 + 10 * closing_mm
+    best = Proposal(closing_mm, (), 0, exponent, None, np.ones(3), np.ones(3), limit_mm2, None)
+    drafted, _ = draft_recipe(recipe, best, "strawberry", tmp_path)
+    assert [each.closing_mm for each in drafted.damage.area] == closings_mm
+    areas_mm2 = {each.closing_mm: each.area_mm2 for each in drafted.damage.area}
+    assert areas_mm2[closing_mm] == limit_mm2
 
 
 @pytest.mark.parametrize(

@@ -75,8 +75,11 @@ class RejectGate(TwinNode):
             self._station_s = None  # watched again from its next beat on (CiA 301, heartbeat consumer)
             self.raise_error(_HEARTBEAT_LOST, _COMMUNICATION)
             if self.operational:
-                self.local.nmt.state = "STOPPED" if self.read(0x1029, 1) == 2 else "PRE-OPERATIONAL"
-                self.on_state()
+                # CiA 301: 1029 selects the state after an error of communication; 1 is none other.
+                state = {0: "PRE-OPERATIONAL", 2: "STOPPED"}.get(self.read(0x1029, 1))
+                if state is not None:
+                    self.local.nmt.state = state
+                    self.on_state()
         # An RPDO's event timer, in ms, is the longest silence of its sender: here of the encoder.
         limit_s = self.read(0x1401, 5) / 1000
         if self.operational and limit_s and now_s - self._counted_s > limit_s:
@@ -167,7 +170,8 @@ class RejectGate(TwinNode):
         return None
 
     def _write(self, *, index: int, subindex: int, data: bytes, **_: object) -> None:
-        if 0x1600 <= index <= 0x1BFF and self._faults.active(LineFault.MAPPING_REFUSED):
+        # CiA 301: 1600 to 17FF map what is received, 1A00 to 1BFF what is sent.
+        if (0x1600 <= index <= 0x17FF or 0x1A00 <= index <= 0x1BFF) and self._faults.active(LineFault.MAPPING_REFUSED):
             raise SdoAbortedError(_CANNOT_BE_MAPPED if subindex else _GENERAL)
         if (index, subindex) == (0x1016, 1):
             # CiA 301: the consumer watches the new node from its first heartbeat on.

@@ -225,7 +225,7 @@ class UrController:
         if "emergency_stop" in ended:
             self.safety.release_emergency_stop()
         if "local_mode" in begun | ended:
-            self.safety.remote = "local_mode" not in begun
+            self.safety.remote = "local_mode" not in faults
             self.network.cut_programmers()
         reachable = {CommonFault.OFF, "link_cut"}
         if (begun | ended) & reachable:

@@ -167,6 +167,18 @@ def test_local_control_is_named_and_the_program_comes_back_after_it(healthy_arm,
     asyncio.run(run())
 
 
+def test_local_control_that_ends_before_the_controllers_next_cycle_leaves_it_remote(healthy_arm, until):
+    async def run():
+        async with healthy_arm() as (bench, _):
+            bench.faults.set("local_mode")
+            bench.faults.clear("local_mode")
+            bench.faults.set("safeguard")
+            await until(lambda: bench.controller.safety.guard_open)
+            assert bench.controller.safety.remote
+
+    asyncio.run(run())
+
+
 def test_a_persons_verb_is_refused_at_once_where_local_control_forbids_it(healthy_arm, until):
     async def run():
         async with healthy_arm(recovery_deadline_s=30.0) as (bench, arm):

@@ -17,6 +17,8 @@ def test_a_trigger_that_was_pending_at_the_end_counts_as_one_that_was_missed(ben
     assert (made.state.missed, made.state.last_refusal, made.state.last_refused_id) == (True, Refusal.STATION_LOST, 7)
     assert (made.state.journal.asked_id, made.state.journal.disowned) == (None, (7,))
     assert not any(bench().state.counters.values())
+    full = bench(Journal(asked_id=7, disowned=tuple(range(101, 109))))
+    assert full.state.journal.disowned == (*range(102, 109), 7)
 
 
 def test_starts_of_the_station_are_counted_modulo_65536(bench):
