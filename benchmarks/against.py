@@ -46,7 +46,7 @@ def run(revision: str, names: Sequence[str], run_now: Callable[[str], int]) -> i
         run_now: runs a benchmark of now by its name, and returns its exit code.
 
     Returns:
-        0 where all succeeded, else another number at the first that failed; what ran before it is kept.
+        0 where all succeeded, else another number at the first that failed; what ran before it is stored.
 
     Raises:
         subprocess.CalledProcessError: there is no such revision.

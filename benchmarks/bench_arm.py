@@ -53,10 +53,10 @@ def run_bare_control(durations_s: "multiprocessing.Queue[float]") -> None:
     from rtde_control import RTDEControlInterface  # noqa: PLC0415
 
     control = RTDEControlInterface(HOST)
-    begun_s = time.perf_counter()
+    began_s = time.perf_counter()
     for _ in range(ROUND_TRIPS):
         control.isSteady()
-    durations_s.put((time.perf_counter() - begun_s) / ROUND_TRIPS)
+    durations_s.put((time.perf_counter() - began_s) / ROUND_TRIPS)
     control.disconnect()
 
 
@@ -103,9 +103,9 @@ async def with_driver(controller: psutil.Process, frequency_hz: float) -> tuple[
         await asyncio.gather(driving, return_exceptions=True)
         durations = []
         for _ in range(ROUND_TRIPS):
-            begun_s = time.perf_counter()
+            began_s = time.perf_counter()
             await arm.state()
-            durations.append(time.perf_counter() - begun_s)
+            durations.append(time.perf_counter() - began_s)
         return rows, sorted(durations)
 
 

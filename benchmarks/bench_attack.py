@@ -145,8 +145,8 @@ class Bystander:
         command = [sys.executable, str(BYSTANDERS), *map(str, arguments)]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
-    def begun(self) -> None:
-        """Wait until it has begun."""
+    def wait_started(self) -> None:
+        """Wait until it has started."""
         if self._process.stdout is None or self._process.stdout.readline() != "begun\n":
             raise SystemExit("a client beside the attack did not begin")
 
@@ -196,8 +196,8 @@ def carried_out(attack: Attack, target: Target, endpoint: str) -> Row:
     name, pin = pages.PINS[Role.OPERATOR]
     client = Bystander("scan", target.modbus)
     panel = Bystander("panel", target.tls if attack.on == "tls" else target.pages, endpoint, name, pin)
-    client.begun()
-    panel.begun()
+    client.wait_started()
+    panel.wait_started()
     sampled.start()
     try:
         found = attack.run(target)
@@ -223,20 +223,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seconds", type=float, default=SECONDS, help="of each attack")
     parser.add_argument("--small", action="store_true", help="short attacks, and no document")
     parser.add_argument("--only", default="", help="attacks with this word in their row alone, and no document")
-    asked = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     go_apart()
     hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(MOST_FILES, hard), hard))
-    seconds = SMALL_S if asked.small else asked.seconds
+    seconds = SMALL_S if options.small else options.seconds
     attacks = [Attack("", "no attack", nothing), *modbus.ATTACKS, *pages.ATTACKS]
-    chosen = [each for each in attacks if asked.only in f"{each.on} {each.name}"]
+    chosen = [each for each in attacks if options.only in f"{each.on} {each.name}"]
     before = os.getloadavg()[0]
     rows: list[Row] = []
     with station(seconds) as (target, endpoint):
         for attack in chosen:
             rows.append(carried_out(attack, target, endpoint))
             text = markdown(rows, seconds, (before, os.getloadavg()[0]))
-            if not asked.small and not asked.only:
+            if not options.small and not options.only:
                 DOCUMENT.write_text(text, encoding="utf-8")
     return any(row.wrong for row in rows)
 

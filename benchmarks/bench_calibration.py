@@ -2,7 +2,7 @@
 
 The ball is drawn by the twin with its measured noise and drift, at whole counts of the gripper; the true areas and the
 true scale are known. The published pipeline measures the same frames beside the station's method, and the usual scale
-stands beside the measured one. Writes its tables into docs/calibration.md.
+is beside the measured one. Writes its tables into docs/calibration.md.
 """
 
 import asyncio

@@ -35,7 +35,7 @@ BEGIN, END = "<!-- bench can: begin -->", "<!-- bench can: end -->"
 
 
 async def serve(settings: CanSettings, pipe: Connection) -> None:
-    """Run the nodes until told to end."""
+    """Run the nodes until they are ended."""
     nodes = LineNodes(settings, SteadyClock(), line_faults())
     await nodes.start()
     pipe.send("ready")

@@ -48,7 +48,7 @@ def cpu_s(process: psutil.Process) -> float:
 
 
 def start_twin(configuration: Path) -> subprocess.Popen[str]:
-    """A twin that listens where the configuration looks; returns once it runs."""
+    """A twin that listens at the configuration's addresses; returns once it runs."""
     command = [sys.executable, "-m", "station", "twin", "--config", str(configuration), "--console", "0"]
     twin = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     for line in twin.stdout or ():

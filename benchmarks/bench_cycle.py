@@ -207,16 +207,16 @@ async def inspect(configuration: Configuration) -> dict[str, Pace]:
             began_s = time.monotonic()
             length = round(10 * draw_fruit(Kind(kind), seed).length_mm)
             trigger = Begin(trigger_id=number, encoder=0, lot="", fruit_length_mm_x10=length)
-            begun = await client.request(trigger, BeginReply, deadline_s=5)
-            if begun.sequence is None:
-                raise SystemExit(f"the station refuses: {begun.refusal}")
-            outcome = await client.request(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=PATIENCE_S)
-            told_s = time.monotonic() - began_s
+            reply = await client.request(trigger, BeginReply, deadline_s=5)
+            if reply.sequence is None:
+                raise SystemExit(f"the station refuses: {reply.refusal}")
+            outcome = await client.request(AwaitOutcome(sequence=reply.sequence), Outcome, deadline_s=PATIENCE_S)
+            outcome_s = time.monotonic() - began_s
             await ready()
             again_s = time.monotonic() - began_s
             await client.request(Published(outcome=outcome), Noted, deadline_s=5)
             await client.request(Acknowledged(sequence=outcome.sequence), Noted, deadline_s=5)
-            return Inspected(seed, told_s, again_s, outcome.sequence, outcome.outcome)
+            return Inspected(seed, outcome_s, again_s, outcome.sequence, outcome.outcome)
 
         for kind in FRUIT:
             order = Command(command=CommandName.CHANGE_RECIPE, argument=recipes[kind].plc_number)
@@ -466,7 +466,7 @@ def other_way(recipe: Recipe) -> str:
 
 
 def configured(folder: str, way: Mapping[str, str] | None = None) -> tuple[Path, Configuration]:
-    """A cell's configuration file, and what it says; with the shipped recipes, or those measured in another way."""
+    """A cell's configuration file, and its content; with the shipped recipes, or those measured in another way."""
     file = Path(folder) / "station.yaml"
     own = f"recipes_folder: {recipes_measured(folder, way)}\n" if way else ""
     file.write_text(

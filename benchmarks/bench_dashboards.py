@@ -20,9 +20,9 @@ from archive import postgres
 from matplotlib.dates import ConciseDateFormatter, DayLocator, date2num
 from matplotlib.figure import Figure
 from monitoring import history, month, prometheus, site
-from monitoring.asking import Panel, dashboards, panels, promql, sql
 from monitoring.document import DOCUMENT, alerts, with_part
 from monitoring.drawing import Answer, Rows, draw
+from monitoring.queries import Panel, dashboards, panels, promql, sql
 
 IMAGES = DOCUMENT.parent / "images"
 FRUITS = 9
@@ -38,7 +38,7 @@ def over_time(panel: Panel) -> bool:
     return panel.data["type"] in {"timeseries", "heatmap"}
 
 
-def ask_all(
+def query_target(
     found: prometheus.Prometheus,
     server: Any,
     begin_s: float,
@@ -48,7 +48,7 @@ def ask_all(
     panel: Panel,
     target: dict[str, Any],
 ) -> Answer:
-    """One target's answer, from whichever database it asks."""
+    """One target's answer, from the database that it queries."""
     if "rawSql" in target:
         times = (datetime.fromtimestamp(at, UTC).isoformat() for at in (begin_s, end_s))
         text = sql(target["rawSql"], *times, station=[site.STATION], fruit=["blueberry"])
@@ -72,14 +72,14 @@ def of_demonstration() -> None:
         site.demonstration(Path(folder), server, FRUITS, "127.89.0.1") as shown,
     ):
         for name, board in dashboards().items():
-            ask = partial(ask_all, shown.prometheus, server, shown.began_s + 10, shown.at_s, "15s", "30s")
+            query = partial(query_target, shown.prometheus, server, shown.began_s + 10, shown.at_s, "15s", "30s")
             chosen = [panel for panel in panels() if panel.board == name]
             title = f"{board['title']}: {FRUITS} fruits of a demonstration, drawn by the project, not by Grafana"
-            draw(board, chosen, ask, IMAGES / f"monitoring-{name}.png", title)
+            draw(board, chosen, query, IMAGES / f"monitoring-{name}.png", title)
 
 
 def of_month() -> str:
-    """Simulate it twice, with and without troubles; draw, and tell what was told."""
+    """Simulate it twice, with and without troubles; draw, and report the alerts that fired."""
     parts = []
     for bad in (True, False):
         plan = month.Plan(BEGIN_S, DAYS, STEP_S, month.troubles(*BAD_DAYS) if bad else ())
@@ -90,26 +90,26 @@ def of_month() -> str:
             history.record(plan, folder)
             configuration = prometheus.write_configuration(folder, "1m", {})
             with prometheus.running(folder, configuration, *history.NO_COMPACTION) as found:
-                told = history.told(found, plan)
+                fired = history.fired_alerts(found, plan)
                 fruit = found.now("sum(increase(station_inspections_total[30d]))", plan.end_s)[0].points[0][1]
                 if bad:
-                    draw_month(found, plan, told)
+                    draw_month(found, plan, fired)
                     draw_bad_week(found, plan)
         took_s = time.monotonic() - began_s
-        parts.append(words(plan, told, fruit, took_s))
+        parts.append(words(plan, fired, fruit, took_s))
     return "\n".join(parts)
 
 
-def words(plan: month.Plan, told: Sequence[history.Told], fruit: float, took_s: float) -> str:
+def words(plan: month.Plan, fired: Sequence[history.FiredAlert], fruit: float, took_s: float) -> str:
     """One month in words."""
     head = (
         f"{plan.days} days, about {fruit:,.0f} fruit, a sample every {plan.step_s // 60} minutes, simulated and "
         f"evaluated in {took_s / 60:.1f} minutes: "
     )
     if not plan.troubles:
-        return head + f"without troubles, **{len(told)}** alerts fired.\n"
+        return head + f"without troubles, **{len(fired)}** alerts fired.\n"
     lines = ["| what | from | until | alert | fired after | until |", "|---|---|---|---|---|---|"]
-    left = list(told)
+    left = list(fired)
     for trouble in plan.troubles:
         begin_s, end_s = plan.begin_s + trouble.begin_s, plan.begin_s + trouble.end_s
         its = [each for each in left if each.alert in trouble.alerts and begin_s <= each.begin_s < end_s]
@@ -124,8 +124,8 @@ def words(plan: month.Plan, told: Sequence[history.Told], fruit: float, took_s: 
     return head + "with three troubles.\n\n" + "\n".join(lines) + f"\n\nOther alerts: {others}.\n"
 
 
-def draw_month(found: prometheus.Prometheus, plan: month.Plan, told: Sequence[history.Told]) -> None:
-    """The reject rate with its band, the drift, and what was told when."""
+def draw_month(found: prometheus.Prometheus, plan: month.Plan, fired: Sequence[history.FiredAlert]) -> None:
+    """The reject rate with its band, the drift, and the alerts with their times."""
     with mpl.rc_context({"font.size": 9}):
         figure = Figure(figsize=(13, 8), layout="constrained")
         rate, drift, alarm = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 2))
@@ -146,8 +146,8 @@ def draw_month(found: prometheus.Prometheus, plan: month.Plan, told: Sequence[hi
             drift.plot([_date(at_s) for at_s, _ in series.points], [value for _, value in series.points], linewidth=0.7)
         drift.axhline(12.5, color="#c55a11", linestyle="--", linewidth=0.8)
         drift.set_ylabel("drift of the reference [grey levels]")
-        names = sorted({each.alert for each in told})
-        for each in told:
+        names = sorted({each.alert for each in fired})
+        for each in fired:
             y = names.index(each.alert)
             alarm.barh(
                 y, _date(each.end_s) - _date(each.begin_s), left=_date(each.begin_s), height=0.5, color="#b3261e"
@@ -178,14 +178,14 @@ def draw_bad_week(found: prometheus.Prometheus, plan: month.Plan) -> None:
         plan.begin_s + (BAD_DAYS[0] - 1) * month.DAY_S,
         plan.begin_s + (BAD_DAYS[0] + 1) * month.DAY_S - 2 * month.HOUR_S,
     )
-    ask = partial(ask_all, found, None, begin_s, end_s, "20m", "1w")
+    query = partial(query_target, found, None, begin_s, end_s, "20m", "1w")
     chosen = [panel for panel in panels() if panel.board == "line"]
     title = "Line: the day of a bad lot and the day before, simulated, drawn by the project, not by Grafana"
-    draw(board, chosen, ask, IMAGES / "monitoring-bad-lot.png", title)
+    draw(board, chosen, query, IMAGES / "monitoring-bad-lot.png", title)
 
 
 def main() -> None:
-    """Do all, or what is asked for."""
+    """Do all, or what is requested."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--only", choices=("alerts", "demo", "month"))
     only = parser.parse_args().only

@@ -1,7 +1,7 @@
 """The fault matrix: every scenario of tests/reliability/scenarios in its phases, on the real processes.
 
 Run with `./run bench faults`, or a part by name: `./run bench faults arm_link_cut service_killed --phase stepping`.
-The last rows of each scenario are kept in benchmarks/reliability/measured.json; docs/reliability.md is made from them.
+The last rows of each scenario are in benchmarks/reliability/measured.json; docs/reliability.md is made from them.
 Exits 1 where a row does not hold.
 """
 
@@ -39,7 +39,7 @@ async def run_scenario(scenario: Scenario, phases: Sequence[Phase], logs: Path |
                 async with running(folder, scenario) as rig:
                     while left:
                         rows.append(await play(rig, scenario, left.pop(0)))
-                        print(told(rows[-1]), flush=True)
+                        print(line_of(rows[-1]), flush=True)
                         if rows[-1].wrong:
                             break
             except CannotDoError as error:
@@ -47,13 +47,13 @@ async def run_scenario(scenario: Scenario, phases: Sequence[Phase], logs: Path |
                 left = []
             except StationError as error:
                 rows.append(Row(scenario=scenario.name, phase=left.pop(0).value, wrong=(f"no station: {error}",)))
-                print(told(rows[-1]), flush=True)
+                print(line_of(rows[-1]), flush=True)
             if logs is not None and rows and rows[-1].wrong:
                 shutil.copytree(folder / "logs", logs / f"{scenario.name}-{rows[-1].phase}", dirs_exist_ok=True)
     return rows
 
 
-def told(row: Row) -> str:
+def line_of(row: Row) -> str:
     """A row in one line."""
     how = f"skipped: {row.skipped}" if row.skipped else "; ".join(row.wrong) or "holds"
     back = "" if row.recovered_s is None else f", ready after {row.recovered_s} s"
@@ -79,20 +79,25 @@ def keep(rows: Sequence[Row], scenarios: Sequence[Scenario]) -> None:
 
 
 async def run_all(
-    chosen: Sequence[Scenario], phases: Sequence[Phase], logs: Path | None, scenarios: Sequence[Scenario], *, kept: bool
+    chosen: Sequence[Scenario],
+    phases: Sequence[Phase],
+    logs: Path | None,
+    scenarios: Sequence[Scenario],
+    *,
+    stored: bool,
 ) -> bool:
     """Play them one after the other. Whether all held."""
     held = True
     for scenario in chosen:
         rows = await run_scenario(scenario, [phase for phase in scenario.phases if phase in phases], logs)
         held &= not any(row.wrong for row in rows)
-        if kept:
+        if stored:
             keep(rows, scenarios)
     return held
 
 
 def main() -> None:
-    """Play what was asked for."""
+    """Play what was requested."""
     parser = argparse.ArgumentParser(description="The fault matrix on the real processes.")
     parser.add_argument("names", nargs="*", metavar="SCENARIO", help="all where none is given")
     parser.add_argument("--phase", action="append", choices=list(Phase), type=Phase, help="may be repeated")
@@ -100,18 +105,18 @@ def main() -> None:
     parser.add_argument("--scenarios", type=Path, default=SCENARIOS, help="a folder of other scenario files")
     parser.add_argument("--dry", action="store_true", help="leave the page as it is")
     parser.add_argument("--list", action="store_true", help="name the scenarios")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     try:
-        scenarios = load_scenarios(asked.scenarios)
+        scenarios = load_scenarios(options.scenarios)
     except BadInputError as error:
         print(error, file=sys.stderr)
         sys.exit(2)
-    unknown = set(asked.names) - {scenario.name for scenario in scenarios}
-    if unknown or asked.list:
+    unknown = set(options.names) - {scenario.name for scenario in scenarios}
+    if unknown or options.list:
         print("scenarios: " + ", ".join(scenario.name for scenario in scenarios))
         sys.exit(2 if unknown else 0)
-    chosen = [scenario for scenario in scenarios if not asked.names or scenario.name in asked.names]
-    held = asyncio.run(run_all(chosen, asked.phase or list(Phase), asked.logs, scenarios, kept=not asked.dry))
+    chosen = [scenario for scenario in scenarios if not options.names or scenario.name in options.names]
+    held = asyncio.run(run_all(chosen, options.phase or list(Phase), options.logs, scenarios, stored=not options.dry))
     sys.exit(0 if held else 1)
 
 

@@ -2,7 +2,7 @@
 
 Run with `./run bench fit` for the search alone, `--all` for everything (about an hour on two cores) or one of the other
 parts. Each part writes its section of `docs/robust-constants.md`. `--check NAME=VALUE ...` prints what changed
-constants cost and writes nothing. Images are rendered once and kept in `--cache`.
+constants cost and writes nothing. Images are rendered once and stored in `--cache`.
 """
 
 import argparse
@@ -165,7 +165,7 @@ def fit(runner: Runner, cache: Path) -> None:
 
 
 def reference(runner: Runner, images: Path) -> None:
-    """Write how far the reference check tells a unit from another."""
+    """Write how far the reference check separates a unit from another."""
     lines = [
         "The statistic of `station/vision/reference_check.py` over its threshold; above 1 a frame is flagged as of",
         "another unit. The thresholds were chosen on these images, and on them with noise, drift and compression. The",

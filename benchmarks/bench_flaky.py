@@ -1,8 +1,8 @@
 """Timing-bound tests, again and again on busy cores: which of them pass by luck.
 
 A test is timing-bound if it reads a clock, sets a deadline, or waits for something within one. A round runs all of
-them in random order, with so many at once that each has the others as its load. Every round is kept at once, and the
-same command goes on until there are a hundred. Writes docs/flaky-tests.md.
+them in random order, with so many at once that each has the others as its load. Every round is stored at once, and
+the same command goes on until there are a hundred. Writes docs/flaky-tests.md.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from revision import commit
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT = ROOT / "docs" / "flaky-tests.md"
-KEPT = Path(__file__).resolve().parent / "reliability" / "flaky_rounds.json"
+ROUNDS_FILE = Path(__file__).resolve().parent / "reliability" / "flaky_rounds.json"
 ROUNDS = 100
 _AT_ONCE = 3
 """Tests a core. With six a core, each core had eight processes to run at a time."""
@@ -69,12 +69,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="in all, with those that are kept")
     parser.add_argument("--minutes", type=float, default=60.0, help="no round begins after them")
-    asked = parser.parse_args()
-    rounds: list[Round] = json.loads(KEPT.read_text("utf-8")) if KEPT.exists() else []
+    options = parser.parse_args()
+    rounds: list[Round] = json.loads(ROUNDS_FILE.read_text("utf-8")) if ROUNDS_FILE.exists() else []
     began_s = time.monotonic()
-    while len(rounds) < asked.rounds and time.monotonic() - began_s < 60 * asked.minutes:
+    while len(rounds) < options.rounds and time.monotonic() - began_s < 60 * options.minutes:
         rounds.append(play(rounds[-1]["seed"] + 1 if rounds else 1))
-        KEPT.write_text(json.dumps(rounds, indent=1) + "\n", encoding="utf-8")
+        ROUNDS_FILE.write_text(json.dumps(rounds, indent=1) + "\n", encoding="utf-8")
         machine = f"{os.cpu_count()} cores ({platform.machine()})"
         sections.write(DOCUMENT, {"played": played(rounds, ROUNDS, machine), "failures": failures(rounds)})
         print(f"round {len(rounds)}: {rounds[-1]['minutes']} min, failed: {rounds[-1]['failed'] or 'none'}", flush=True)

@@ -23,10 +23,10 @@ from typing import Any, NamedTuple
 
 from archive import postgres
 from fleet import cohort, metrics_year, plain, stations, year
-from monitoring.asking import dashboards, panels, promql, sql
 from monitoring.document import with_part
 from monitoring.ports import free_ports
 from monitoring.prometheus import Prometheus, missing, promtool, running, write_configuration
+from monitoring.queries import dashboards, panels, promql, sql
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "fleet.md"
 STATIONS = 10
@@ -132,8 +132,8 @@ async def arrival(
         ):
             counted[each.labels["station"]][each.labels["outcome"]] = int(each.points[0][1])
         with server.connect() as connection:
-            told = dict(connection.execute("SELECT station, max(last_entry) FROM stations GROUP BY 1").fetchall())
-        there = told == wanted and all(counted[name] == Counter(rows.values()) for name, rows in own.items())
+            arrived = dict(connection.execute("SELECT station, max(last_entry) FROM stations GROUP BY 1").fetchall())
+        there = arrived == wanted and all(counted[name] == Counter(rows.values()) for name, rows in own.items())
         if there or time.monotonic() > until_s:
             return counted
         await asyncio.sleep(1.0)
@@ -163,13 +163,13 @@ def records(days: int) -> Part:
         def on_day() -> None:
             nonlocal done
             done += 1
-            say(f"day {done} of {days} after {time.monotonic() - began_s:.0f} s")
+            report(f"day {done} of {days} after {time.monotonic() - began_s:.0f} s")
 
         inspections = year.load(server, STATIONS, days, on_day)
         loaded_s = time.monotonic() - began_s
         found = []
         for each in year.measure(server, queries, days, STATIONS, sql):
-            say(str(each))
+            report(str(each))
             found.append(each)
         with server.connect() as connection:
             sizes = connection.execute(
@@ -234,7 +234,7 @@ def metrics() -> Part:
             samples = 0
             for number, each in enumerate(making, 1):
                 samples += each.result()
-                say(f"block {number} of {len(making)} after {time.monotonic() - began_s:.0f} s")
+                report(f"block {number} of {len(making)} after {time.monotonic() - began_s:.0f} s")
         made_s = time.monotonic() - began_s
         queries = [
             (panel.title, promql(target["expr"], ".+", "1m"), panel.data["type"] == "timeseries")
@@ -276,7 +276,7 @@ def study() -> Part:
         for number in range(COHORT_RUNS):
             for workers in (0, 1, 2):
                 runs.append(cohort.measure(Path(name) / f"{number}-{workers}", workers, COHORT))
-                say(f"{workers} workers: {runs[-1].took_s:.1f} s")
+                report(f"{workers} workers: {runs[-1].took_s:.1f} s")
     took_s = {workers: [run.took_s for run in runs if run.workers == workers] for workers in (0, 1, 2)}
     differing = cohort.different(runs)
     alone_s = statistics.median(took_s[1])
@@ -308,7 +308,7 @@ def database() -> Any:
     return postgres.throwaway(programs)
 
 
-def say(message: str) -> None:
+def report(message: str) -> None:
     """Report progress."""
     print(message, file=sys.stderr, flush=True)
 
@@ -316,8 +316,8 @@ def say(message: str) -> None:
 def main() -> int:
     """Make the parts, and write them into the page."""
     made: dict[str, Callable[[], Part]] = {
-        "live": lambda: live(asked.stations),
-        "records": lambda: records(asked.days),
+        "live": lambda: live(options.stations),
+        "records": lambda: records(options.days),
         "metrics": metrics,
         "study": study,
     }
@@ -325,8 +325,8 @@ def main() -> int:
     parser.add_argument("--only", choices=tuple(made))
     parser.add_argument("--stations", type=int, default=STATIONS, help="whole stations that run at once")
     parser.add_argument("--days", type=int, default=SEASON_DAYS, help="of the season of records")
-    asked = parser.parse_args()
-    only = asked.only
+    options = parser.parse_args()
+    only = options.only
     if (name := missing()) is not None:
         raise SystemExit(f"{name} is missing: apt-get install prometheus")
     wrong = []
@@ -337,7 +337,7 @@ def main() -> int:
             wrong += found.wrong
             DOCUMENT.write_text(with_part(DOCUMENT.read_text("utf-8"), part, found.text), encoding="utf-8")
     for line in wrong:
-        say(line)
+        report(line)
     return 1 if wrong else 0
 
 

@@ -21,9 +21,9 @@ DOCUMENT = ROOT / "README.md"
 
 def strangers_environment() -> dict[str, str]:
     """Return the environment variables without those that name this checkout's Python."""
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "VIRTUAL_ENV"))}
-    programs = [each for each in kept.get("PATH", "").split(os.pathsep) if not each.startswith(str(ROOT))]
-    return kept | {"PATH": os.pathsep.join(programs)}
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "VIRTUAL_ENV"))}
+    programs = [each for each in environment.get("PATH", "").split(os.pathsep) if not each.startswith(str(ROOT))]
+    return environment | {"PATH": os.pathsep.join(programs)}
 
 
 def timed(clone: Path, *command: str) -> tuple[float, str]:
@@ -52,7 +52,7 @@ def total(text: str, what: str) -> int:
 
 
 def installing_s(text: str) -> int:
-    """Return the seconds that `run` says the environment took; 0 where it was there."""
+    """Return the seconds that `run` reports for the environment; 0 where it was there."""
     made = re.search(r"ready after (\d+) s", text)
     return int(made[1]) if made else 0
 

@@ -44,7 +44,7 @@ def count_for(width_mm: float) -> int:
 
 
 async def twin(pipe: Connection) -> None:
-    """Serve one gripper with a soft load on three wires until told to end."""
+    """Serve one gripper with a soft load on three wires until it is ended."""
     gripper = RobotiqGripper(SteadyClock(), gripper_faults(), Spring(free_mm=76.0, stiffness_n_per_mm=1.0))
     urcap, tcp, serial = UrcapServer(gripper, port=0), RtuOverTcpServer(gripper, port=0), RtuSerialServer(gripper)
     for server in (urcap, tcp, serial):

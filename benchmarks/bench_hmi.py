@@ -1,6 +1,6 @@
 """Cost of the operators' pages: a first load, the processor with three clients at 10 Hz, and the PLC's latency.
 
-Run with `./run bench hmi [SECONDS] [--rounds N]`: a whole demonstration with fruit after fruit; nobody looks, three
+Run with `./run bench hmi [SECONDS] [--rounds N]`: a whole demonstration with fruit after fruit; no client, three
 panels take the page Run, ten readers page through the history and its images, three headless Chromiums show the page
 Run on the same cores, and then the same page made with NiceGUI, in turn in every round. Writes `docs/hmi-speed.md`.
 With `--pictures` it only draws the pages into `docs/images/hmi-*.png`.
@@ -21,23 +21,23 @@ from typing import Any, NamedTuple
 
 import psutil
 from bench_plc import built
-from looking.peer import nicegui, peer_browsers
-from looking.pictures import draw
-from looking.rounds import (
+from hmi_load.peer import nicegui, peer_browsers
+from hmi_load.pictures import draw
+from hmi_load.rounds import (
     BROWSERS,
     HISTORY_READERS,
-    LOOKERS,
-    NOBODY,
+    NO_CLIENT,
+    PANEL_COUNT,
     PANELS,
     PEER,
     READERS,
     Round,
-    asking,
     browsers,
     clients,
     compared,
     conditions_of,
     differences,
+    plc_reader,
     table,
 )
 from monitoring.ports import free_port
@@ -59,7 +59,7 @@ OWN_PICTURE, PEER_PICTURE = "img.fruit-picture", ".fruit-picture img"
 
 
 class Load(NamedTuple):
-    """A first load of the page Run, with nothing kept from before."""
+    """A first load of the page Run, with nothing cached from before."""
 
     transferred_bytes: int
     requests: int
@@ -156,7 +156,7 @@ def first_load(browser: Browser, address: str, shown: str) -> Load:
     page.context.new_cdp_session(page).send("Network.enable")
     watching = page.context.new_cdp_session(page)
     watching.send("Network.enable")
-    watching.on("Network.loadingFinished", lambda told: sizes.append(told["encodedDataLength"]))
+    watching.on("Network.loadingFinished", lambda event: sizes.append(event["encodedDataLength"]))
     began_s = time.monotonic()
     page.goto(address)
     picture = page.locator(shown).first
@@ -169,7 +169,7 @@ def first_load(browser: Browser, address: str, shown: str) -> Load:
 
 def written(load: Load, peer: Load, found: dict[str, list[Round]], conditions: str) -> str:
     """The document."""
-    told = (
+    introduction = (
         "Written by `./run bench hmi`: a demonstration with fruit after fruit, the page Run updated "
         f"{1 / REFRESH_S:.0f} times a second. Three panels: clients in a process of their own that read the page's "
         "stream and fetch its pictures, as separate panel computers do. Ten readers: likewise, each opens a page of "
@@ -184,7 +184,7 @@ def written(load: Load, peer: Load, found: dict[str, list[Round]], conditions: s
         f"| this page | {load.row} |",
         f"| NiceGUI's page | {peer.row} |",
     ]
-    lines = ["# Cost of the operators' pages", "", told, "", *table(found), "", *differences(found)]
+    lines = ["# Cost of the operators' pages", "", introduction, "", *table(found), "", *differences(found)]
     return "\n".join([*lines, "", *first, "", conditions, ""])
 
 
@@ -196,15 +196,15 @@ def measure(running: Demo, browser: Browser, rounds: int, seconds: float) -> str
         peer = first_load(browser, address, PEER_PICTURE)
     parts = {name: running.part(name) for name in ("hmi", "service")}
     who: dict[str, Callable[[], contextlib.AbstractContextManager[Any]]] = {
-        NOBODY: contextlib.nullcontext,
-        PANELS: lambda: clients("panels", LOOKERS, host, port),
+        NO_CLIENT: contextlib.nullcontext,
+        PANELS: lambda: clients("panels", PANEL_COUNT, host, port),
         READERS: lambda: clients("readers", HISTORY_READERS, host, port),
         BROWSERS: lambda: browsers(browser, host, port),
-        PEER: lambda: peer_browsers(browser, running.configuration, LOOKERS),
+        PEER: lambda: peer_browsers(browser, running.configuration, PANEL_COUNT),
     }
     metrics = f"http://{running.site.metrics.host}:{running.site.metrics.port}/metrics"
     with tempfile.TemporaryDirectory() as folder:
-        plc = asking(built("load", Path(folder)), running.site.modbus.port)
+        plc = plc_reader(built("load", Path(folder)), running.site.modbus.port)
         found = compared(who, parts, plc, metrics, rounds, seconds)
     return written(load, peer, found, conditions_of(rounds, seconds))
 
@@ -215,15 +215,15 @@ def main() -> int:
     parser.add_argument("seconds", nargs="?", type=float, default=SECONDS, help="for each condition in each round")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="fewer try it only, and write no document")
     parser.add_argument("--pictures", action="store_true", help="only draw the pages")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     with demo() as running, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        if asked.pictures:
+        if options.pictures:
             draw(address_of(running.site.hmi), running.part("hmi"), browser, running.console)
         else:
-            text = measure(running, browser, asked.rounds, asked.seconds)
+            text = measure(running, browser, options.rounds, options.seconds)
             print(text)
-            if asked.rounds >= ROUNDS:
+            if options.rounds >= ROUNDS:
                 DOCUMENT.write_text(text, encoding="utf-8")
         browser.close()
     return 0

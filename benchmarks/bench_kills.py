@@ -58,16 +58,16 @@ LONGEST_S = 0.05
 _SILENT_S = 60.0
 
 
-def say(*words: object) -> None:
+def acknowledge(*words: object) -> None:
     """Acknowledge, at once or not at all: a line this short is written whole."""
     os.write(1, (json.dumps(words) + "\n").encode())
 
 
 async def fruit(records: Records, tag: int, pixels: np.ndarray) -> None:
-    """One inspection; every answer of the records is told before the next request."""
+    """One inspection; every answer of the records is acknowledged before the next request."""
     trigger = Trigger(7, tag, f"lot {tag % 5}", 5, RecipeSnapshot("r", 3, "", "{}"), simulated=True)
     sequence = await records.begin(trigger)
-    say("begun", sequence, tag)
+    acknowledge("begun", sequence, tag)
     images = (Image("reference", None, pixels), Image("step", 0, pixels[::-1].copy()))
     curve = tuple(CurvePoint(step, 30.0, None, 1.0, 1, 0.5) for step in range(STEPS))
     record = InspectionRecord(
@@ -75,11 +75,11 @@ async def fruit(records: Records, tag: int, pixels: np.ndarray) -> None:
         confidence=None, ended_utc_ms=9, duration_ms=4, curve=curve, images=images,
     )  # fmt: skip
     outcome = await records.conclude(sequence, record)
-    say("concluded", sequence, tag)
+    acknowledge("concluded", sequence, tag)
     await records.published(outcome)
-    say("published", sequence, tag)
+    acknowledge("published", sequence, tag)
     (row,) = await records.audit(AuditEntry("tester", "quality", "fruit.seen", f"inspection {sequence}"))
-    say("audited", row.seq, tag)
+    acknowledge("audited", row.seq, tag)
 
 
 async def station(folder: Path, round_number: int) -> None:
@@ -102,17 +102,17 @@ def one_kill(folder: Path, round_number: int) -> list[list[object]]:
         asyncio.run(station(folder, round_number))
         os._exit(1)
     os.close(writer)
-    said = b""
+    output = b""
     lines = random.randrange(MOST_LINES) if random.random() < 0.9 else 0  # one in ten in the middle of its start
     until_s = time.monotonic() + _SILENT_S
-    while said.count(b"\n") < lines and time.monotonic() < until_s and select.select([reader], [], [], _SILENT_S)[0]:
-        said += os.read(reader, 65_536)
+    while output.count(b"\n") < lines and time.monotonic() < until_s and select.select([reader], [], [], _SILENT_S)[0]:
+        output += os.read(reader, 65_536)
     time.sleep(random.uniform(0.0, LONGEST_S))
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
     with os.fdopen(reader, "rb") as pipe:
-        said += pipe.read()
-    return [json.loads(line) for line in said.splitlines()]
+        output += pipe.read()
+    return [json.loads(line) for line in output.splitlines()]
 
 
 async def opened_once(folder: Path) -> None:
@@ -121,24 +121,24 @@ async def opened_once(folder: Path) -> None:
     await records.close()
 
 
-def verify(folder: Path, told: dict[str, dict[int, int]], repeated: int) -> dict[str, int]:
+def verify(folder: Path, acks: dict[str, dict[int, int]], repeated: int) -> dict[str, int]:
     """Count each kind of loss or fault in the records after the kills: all 0 if nothing is wrong."""
     wrong: Counter[str] = Counter({"numbers given twice": repeated})
     found = check_records(folder)
     with closing(sqlite3.connect(folder / FILE_NAME)) as database:
         rows = dict(database.execute("SELECT sequence, encoder FROM inspections"))
-        wrong["acknowledged triggers missing"] = sum(rows.get(number) != tag for number, tag in told["begun"].items())
+        wrong["acknowledged triggers missing"] = sum(rows.get(number) != tag for number, tag in acks["begun"].items())
         wrong["triggers recorded twice"] = len(rows) - len(set(rows.values()))
         query = "SELECT i.sequence FROM inspections AS i WHERE judged = 'FAIL' AND (SELECT count(*) FROM curve_points "
         judged = {row for (row,) in database.execute(f"{query} WHERE sequence = i.sequence) = {STEPS}")}
-        wrong["acknowledged outcomes missing"] = len(told["concluded"].keys() - judged)
+        wrong["acknowledged outcomes missing"] = len(acks["concluded"].keys() - judged)
         query = "SELECT sequence FROM inspections WHERE published_utc_ms NOT NULL AND outcome = 'FAIL'"
         wrong["published outcomes missing"] = len(
-            told["published"].keys() - {row for (row,) in database.execute(query)}
+            acks["published"].keys() - {row for (row,) in database.execute(query)}
         )
         query = "SELECT row FROM outbox WHERE kind = 'inspection'"
         wrong["published outcomes not in the outbox"] = len(
-            told["published"].keys() - {r for (r,) in database.execute(query)}
+            acks["published"].keys() - {r for (r,) in database.execute(query)}
         )
         query = "SELECT count(*) FROM inspections WHERE outcome IS NULL"
         wrong["without an outcome after the last start"] = database.execute(query).fetchone()[0]
@@ -149,7 +149,7 @@ def verify(folder: Path, told: dict[str, dict[int, int]], repeated: int) -> dict
     wrong["faults of the database or of an image"] = len(found.faults)
     with reading(folder) as connection:
         trail = [row_of(row) for row in connection.execute(select_rows(audit).order_by(audit.c.seq))]
-    wrong["acknowledged audit rows missing"] = len(told["audited"].keys() - {row.seq for row in trail})
+    wrong["acknowledged audit rows missing"] = len(acks["audited"].keys() - {row.seq for row in trail})
     before = [GENESIS, *(row.hash for row in trail)]
     broken = (row.hash != row.true_hash or row.previous_hash != last for row, last in zip(trail, before, strict=False))
     wrong["broken links of the audit trail"] = sum(broken)
@@ -159,7 +159,7 @@ def verify(folder: Path, told: dict[str, dict[int, int]], repeated: int) -> dict
 async def rounds_of_one_station(seed: int, number: int) -> AsyncIterator[Round | Station]:
     """Kill in one station, round after round, until it does not come back or often enough; then check its records.
 
-    What a station with something wrong leaves is kept, and its place printed.
+    What a station with something wrong leaves is not removed, and its place printed.
     """
     placings: tuple[Literal["nest", "arm"], ...] = ("nest", "arm", "arm", "arm")
     chance, scenario = random.Random(seed), Scenario(name="kills", fault=None, expected=Expected(outcomes=("PASS",)))
@@ -214,22 +214,22 @@ def main() -> int:
     arguments = parser.parse_args()
     if arguments.wire is not None:
         return 0 if asyncio.run(kill_over_the_wire(arguments.wire, arguments.seed)) else 1
-    told: dict[str, dict[int, int]] = {"begun": {}, "concluded": {}, "published": {}, "audited": {}}
+    acks: dict[str, dict[int, int]] = {"begun": {}, "concluded": {}, "published": {}, "audited": {}}
     repeated, began_s = 0, time.perf_counter()
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / "records"
         asyncio.run(opened_once(folder))  # so that each station is forked with all that it needs loaded
         for number in range(arguments.rounds):
             for word, row, tag in one_kill(folder, number):
-                repeated += row in told[str(word)]
-                told[str(word)][int(str(row))] = int(str(tag))
+                repeated += row in acks[str(word)]
+                acks[str(word)][int(str(row))] = int(str(tag))
         asyncio.run(opened_once(folder))
-        wrong = verify(folder, told, repeated)
+        wrong = verify(folder, acks, repeated)
         took_s = time.perf_counter() - began_s
     if arguments.json:
         print(
             json.dumps(
-                {"rounds": arguments.rounds, "told": {word: len(rows) for word, rows in told.items()}, "wrong": wrong}
+                {"rounds": arguments.rounds, "told": {word: len(rows) for word, rows in acks.items()}, "wrong": wrong}
             )
         )
         return 1 if any(wrong.values()) else 0
@@ -238,9 +238,9 @@ def main() -> int:
         "`./run bench kills` writes this page: a station that writes three fruits at a time is killed (SIGKILL) at a "
         "random moment,\none time in ten while it starts. A sample is part of every test run.\n\n"
         "| acknowledged before a kill | |\n| --- | --- |\n"
-        f"| kills | {arguments.rounds} |\n| triggers | {len(told['begun'])} |\n"
-        f"| outcomes | {len(told['concluded'])} |\n| outcomes recorded as published | {len(told['published'])} |\n"
-        f"| rows of the audit trail | {len(told['audited'])} |\n\n"
+        f"| kills | {arguments.rounds} |\n| triggers | {len(acks['begun'])} |\n"
+        f"| outcomes | {len(acks['concluded'])} |\n| outcomes recorded as published | {len(acks['published'])} |\n"
+        f"| rows of the audit trail | {len(acks['audited'])} |\n\n"
         "| wrong afterwards | |\n| --- | --- |\n"
         + "".join(f"| {what} | {count} |\n" for what, count in wrong.items())
         + f"\n{took_s:.0f} s; {platform.machine()}, Python {platform.python_version()}, "

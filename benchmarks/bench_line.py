@@ -60,8 +60,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--a-minute", type=float, default=18.0, help="fruit that arrive in a minute")
     parser.add_argument("--count", type=int, default=200, help="fruit of each kind")
-    asked = parser.parse_args()
-    runs = {kind: at_pace(kind, asked.a_minute, asked.count) for kind in KINDS}
+    options = parser.parse_args()
+    runs = {kind: at_pace(kind, options.a_minute, options.count) for kind in KINDS}
     names = (
         "fruit",
         "arrived",
@@ -73,12 +73,12 @@ def main() -> None:
         "wait before the nest, s: median, most",
         "most that waited",
     )
-    rows = [row(kind, run, wrong, asked.a_minute) for kind, (run, wrong) in runs.items()]
+    rows = [row(kind, run, wrong, options.a_minute) for kind, (run, wrong) in runs.items()]
     pace_table = "\n".join([f"| {' | '.join(names)} |", "|---" * len(names) + "|", *rows])
     every_row = [each for run, _ in runs.values() for each in run.rows]
-    text = f"""# A line at {asked.a_minute:g} fruit a minute
+    text = f"""# A line at {options.a_minute:g} fruit a minute
 
-Written by `./run bench line`. Fruit arrive every {60 / asked.a_minute:.1f} s, {DAMAGED_SHARE:.0%} of them damaged,
+Written by `./run bench line`. Fruit arrive every {60 / options.a_minute:.1f} s, {DAMAGED_SHARE:.0%} of them damaged,
 and are inspected by the shipped recipes. If the nest is not free, a fruit waits in front of it: one that is centred
 or pressed twice may take longer than the pace, and others take less. *Books* are the PLC's readings, the records and
 the metrics. On the twin; unverified on hardware.

@@ -62,20 +62,20 @@ def run(name: str, before: Outcome | None, *, only_alive: bool, every: int) -> O
 
 
 def main() -> None:
-    """Run the rooms that are asked for, and write the page."""
+    """Run the rooms that are requested, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--room", action="append", choices=sorted(ROOMS))
     parser.add_argument("--alive", action="store_true")
     parser.add_argument("--every", type=int, default=1, metavar="N")
-    asked = parser.parse_args()
-    rooms = asked.room or list(ROOMS)
+    options = parser.parse_args()
+    rooms = options.room or list(ROOMS)
     if len(rooms) > 1:  # each in a process of its own, which has not imported what is changed
-        flags = [*(["--alive"] if asked.alive else []), "--every", str(asked.every)]
+        flags = [*(["--alive"] if options.alive else []), "--every", str(options.every)]
         for name in rooms:
             subprocess.run([sys.executable, __file__, "--room", name, *flags], check=True)
         return
     [name] = rooms
-    outcome = run(name, load().get(name), only_alive=asked.alive, every=asked.every)
+    outcome = run(name, load().get(name), only_alive=options.alive, every=options.every)
     known = load() | {name: outcome}
     store(known)
     DOCUMENT.write_text(page(known), encoding="utf-8")

@@ -110,17 +110,17 @@ def bare(server: Server, folder: Path, rows: int) -> float:
         while position < rows:
             batch = read_batch(folder, "bare", position)
             with connection.transaction():
-                told = [(event.entry, json_text(event.data)) for event in batch.events]
-                cursor.executemany("INSERT INTO bare VALUES (%s, %s) ON CONFLICT DO NOTHING", told)
+                rows_of_batch = [(event.entry, json_text(event.data)) for event in batch.events]
+                cursor.executemany("INSERT INTO bare VALUES (%s, %s) ON CONFLICT DO NOTHING", rows_of_batch)
             position = batch.up_to
     return time.perf_counter() - began_s
 
 
 def undisturbed(server: Server, folder: Path, rows: int) -> float:
-    """One station alone tells all it has; s."""
+    """One station alone publishes all it has; s."""
     settings = OutboxPostgresqlSettings(enabled=True, host=str(server.folder), port=PORT, user="fruit", tls="disable")
 
-    async def until_told() -> None:
+    async def publish_all() -> None:
         async with Postgresql(settings, "alone").connected() as session:
             position = 0
             while position < rows:
@@ -129,7 +129,7 @@ def undisturbed(server: Server, folder: Path, rows: int) -> float:
                 position = batch.up_to
 
     began_s = time.perf_counter()
-    asyncio.run(until_told())
+    asyncio.run(publish_all())
     return time.perf_counter() - began_s
 
 

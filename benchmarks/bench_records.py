@@ -1,7 +1,7 @@
 """Cost of the records beside bare sqlite3: a durable inspection, a search among millions, and an export.
 
 An inspection is a begin, a conclusion with 13 curve points, and the note that it was published: three commits that
-somebody waits for, with synchronous=FULL. Prints the tables and writes docs/records-speed.md. The folder to write in
+a caller waits for, with synchronous=FULL. Prints the tables and writes docs/records-speed.md. The folder to write in
 can be given: what is measured is above all its disk; 5 million inspections take some 6 GB of it.
 """
 
@@ -106,16 +106,16 @@ def bare(folder: Path) -> list[str]:
         "CREATE TABLE inspections (sequence INTEGER PRIMARY KEY, begun TEXT, concluded TEXT, published INT)"
     )
     connection.execute("CREATE TABLE points (sequence INT, step INT, width REAL, closing REAL, area REAL, px INT)")
-    begun, concluded = json.dumps([7, 0, "A-17", 1_700_000_000_000]), json.dumps({"outcome": "PASS", "area": 31.5})
+    trigger, outcome = json.dumps([7, 0, "A-17", 1_700_000_000_000]), json.dumps({"outcome": "PASS", "area": 31.5})
     begins_s: list[float] = []
     conclusions_s: list[float] = []
     began_s = time.perf_counter()
     for sequence in range(1, INSPECTIONS + 1):
         first_s = time.perf_counter()
-        connection.execute("INSERT INTO inspections VALUES (?, ?, NULL, NULL)", (sequence, begun))
+        connection.execute("INSERT INTO inspections VALUES (?, ?, NULL, NULL)", (sequence, trigger))
         second_s = time.perf_counter()
         connection.execute("BEGIN IMMEDIATE")
-        connection.execute("UPDATE inspections SET concluded = ? WHERE sequence = ?", (concluded, sequence))
+        connection.execute("UPDATE inspections SET concluded = ? WHERE sequence = ?", (outcome, sequence))
         points = [(sequence, p.step, p.width_mm, p.closing_mm, p.area_mm2, p.area_px) for p in CURVE]
         connection.executemany("INSERT INTO points VALUES (?, ?, ?, ?, ?, ?)", points)
         connection.execute("COMMIT")

@@ -94,10 +94,10 @@ def pin() -> None:
 
 
 async def phase(site: Configuration, load: Path, work: Awaitable[object]) -> Phase:
-    """Measure while something is done; `load` is the client that asks for the PLC's replies."""
+    """Measure while something is done; `load` is the client that measures the PLC's replies."""
     ended, replies = asyncio.Event(), list[Latency]()
 
-    async def ask() -> None:
+    async def measure_replies() -> None:
         while not ended.is_set():
             if (found := await latency(load, site.modbus.port, ended)) is not None:
                 replies.append(found)
@@ -108,11 +108,11 @@ async def phase(site: Configuration, load: Path, work: Awaitable[object]) -> Pha
             replies.append(only)
 
     before, began_s = use(), time.monotonic()
-    asking = asyncio.create_task(ask())
+    measuring = asyncio.create_task(measure_replies())
     await work
     after, wall_s = use(), time.monotonic() - began_s
     ended.set()
-    await asking
+    await measuring
     cpu_s = {name: after[name].cpu_s - before[name].cpu_s for name in before}
     return Phase(wall_s, cpu_s, {name: each.resident_mb for name, each in after.items()}, replies)
 

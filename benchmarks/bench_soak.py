@@ -40,7 +40,7 @@ _ARRIVAL_S = 60.0
 
 @dataclass(slots=True)
 class Run:
-    """Results of a run so far; they are written, whatever ends the run."""
+    """Results of a run so far; they are written at any end of the run."""
 
     samples: list[Sample] = field(default_factory=list)
     """One for each window."""
@@ -59,16 +59,16 @@ async def latency(load: Path, port: int, ended: asyncio.Event) -> Latency | None
     process = await asyncio.create_subprocess_exec(
         load, *arguments, stdout=asyncio.subprocess.PIPE, start_new_session=True
     )
-    asking, ending = asyncio.create_task(process.communicate()), asyncio.create_task(ended.wait())
+    measuring, ending = asyncio.create_task(process.communicate()), asyncio.create_task(ended.wait())
     try:
-        await asyncio.wait([asking, ending], return_when=asyncio.FIRST_COMPLETED)
-        printed = asking.result()[0] if asking.done() else b""
+        await asyncio.wait([measuring, ending], return_when=asyncio.FIRST_COMPLETED)
+        printed = measuring.result()[0] if measuring.done() else b""
         return Latency(*map(float, printed.split()[1:])) if printed else None
     finally:
         ending.cancel()
         with contextlib.suppress(ProcessLookupError):
             process.kill()
-        await asyncio.gather(asking, ending, return_exceptions=True)
+        await asyncio.gather(measuring, ending, return_exceptions=True)
 
 
 async def work_ms(ended: asyncio.Event) -> float:
@@ -169,15 +169,15 @@ def main() -> int:
     """Run, and write what was sampled."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=MINUTES, help="from the first fruit on")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     run, trouble = Run(), ""
     try:
-        asyncio.run(soak(asked.minutes, run))
+        asyncio.run(soak(options.minutes, run))
     except (StationError, OSError, SystemExit) as error:
         trouble = str(error)
         print(trouble, file=sys.stderr)
     if run.samples:
-        text = page(run.samples, run.ending, asked.minutes, trouble, os.getloadavg()[2])
+        text = page(run.samples, run.ending, options.minutes, trouble, os.getloadavg()[2])
         print(text)
         DOCUMENT.write_text(text, encoding="utf-8")
         draw(run.samples, CHART)

@@ -1,6 +1,6 @@
 """Sound, severely and mildly damaged fruit of the twin, decided by the station's own procedure and judge.
 
-Run with `./run bench sorting`. Closings are imaged once and kept below `state/sorting`, by a hash of the code that
+Run with `./run bench sorting`. Closings are imaged once and stored in `state/sorting`, by a hash of the code that
 draws and measures them; judging them by another recipe then takes seconds. `--count 300` images about 1,800 closings of
 each kind, 75 minutes on two cores, and can be interrupted and resumed. Writes the tables of `docs/sorting.md`, and the
 first one into `README.md`: with `--kinds` the rows of these. Other seeds print them only: what is tuned on must not be
@@ -28,7 +28,7 @@ CACHE = ROOT / "state" / "sorting"
 FRUIT = 300
 """Of each kind and damage, for the page."""
 KEYS = {"errors": 1, "why": 1, "worth": 2, "spared": 2}
-"""How many cells of each table say which row it is."""
+"""How many cells of each table identify its row."""
 AS_PLACED = Practice(centring=False, second_press=False)
 OF_EACH_GROUP = 100
 """Fruit on which the practices are compared: without a size nearly all are pressed twice."""
@@ -89,41 +89,41 @@ def main() -> None:
     parser.add_argument("--recipes", type=Path, metavar="DIR", help="the folder of the recipes; else the shipped ones")
     parser.add_argument("--limits", nargs="+", metavar="MM2,…", help="compare these limits of the one kind in --kinds")
     parser.add_argument("--processes", type=int, default=2)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     # No limit on the area finds a patch: a third of the fruit shows that well enough.
-    counts: dict[str, int] = dict.fromkeys((SOUND, Severity.SEVERE, Severity.MILD), asked.count)
-    counts[Severity.PATCH] = asked.count // 3
+    counts: dict[str, int] = dict.fromkeys((SOUND, Severity.SEVERE, Severity.MILD), options.count)
+    counts[Severity.PATCH] = options.count // 3
     tasks = [
         Task(kind, group, seeds, number)
-        for seeds in asked.seeds
-        for kind in asked.kinds
+        for seeds in options.seeds
+        for kind in options.kinds
         for group, count in counts.items()
         for number in range(count)
     ]
-    recipes: dict[str, Recipe] = {kind: find_recipe(kind, asked.recipes) for kind in asked.kinds}
-    cache = PressCache(CACHE, asked.processes, asked.recipes)
-    if asked.limits:
-        (kind,) = asked.kinds
+    recipes: dict[str, Recipe] = {kind: find_recipe(kind, options.recipes) for kind in options.kinds}
+    cache = PressCache(CACHE, options.processes, options.recipes)
+    if options.limits:
+        (kind,) = options.kinds
         two_groups = [task for task in tasks if task.group in {SOUND, Severity.MILD}]
-        compare_limits(two_groups, recipes[kind], asked.limits, cache)
+        compare_limits(two_groups, recipes[kind], options.limits, cache)
         return
     sections: dict[str, list[str]] = {}
-    if {"errors", "why"} & set(asked.tables):
+    if {"errors", "why"} & set(options.tables):
         all_of_it = decided(tasks, recipes, [Practice()], cache)[Practice()]
         sections |= {"errors": tables.errors(all_of_it), "why": tables.diverted_why(all_of_it)}
-    if "worth" in asked.tables:
+    if "worth" in options.tables:
         some = [task for task in tasks if task.number < OF_EACH_GROUP and task.group != Severity.PATCH]
         compared = decided(some, recipes, tables.PRACTICES.values(), cache)
         sections["worth"] = tables.worth({name: compared[practice] for name, practice in tables.PRACTICES.items()})
-    if "spared" in asked.tables:
+    if "spared" in options.tables:
         sound = [task for task in tasks if task.group == SOUND and task.number < PRESSED_ON]
         pressed_on = {kind: without_stop(recipe) for kind, recipe in recipes.items()}
         before, after = (decided(sound, by, [AS_PLACED], cache)[AS_PLACED] for by in (pressed_on, recipes))
         sections["spared"] = tables.spared(before, after)
     for lines in sections.values():
         print("\n".join(lines), end="\n\n")
-    if asked.seeds == ["judging"] and asked.count == FRUIT and asked.recipes is None:
-        of_kinds = {name: named_kinds(lines, asked.kinds) for name, lines in sections.items()}
+    if options.seeds == ["judging"] and options.count == FRUIT and options.recipes is None:
+        of_kinds = {name: named_kinds(lines, options.kinds) for name, lines in sections.items()}
         rows = {name: with_rows(DOCUMENT, name, lines, KEYS[name]) for name, lines in of_kinds.items()}
         write(DOCUMENT, rows)
         if "errors" in rows:

@@ -1,7 +1,7 @@
 """The paper's experiments with both methods on the twin, its denoising on real presses, and the gauge study.
 
 Run with `./run bench study`, with the folder of real images beside the checkout or named by `--images`. Cohorts are
-kept below `state/study` and resumed; those that another version of the code measured are measured anew. Writes the
+stored below `state/study` and resumed; those that another version of the code measured are measured anew. Writes the
 tables of `docs/paper.md` and `docs/grr.md` and the pictures below `docs/paper`. `--only robust` measures no more,
 `--only gauge` writes `docs/grr.md` alone.
 """
@@ -108,12 +108,12 @@ def cause_table(studies: dict[tuple[Kind, str], Study]) -> str:
     for (kind, method), study in studies.items():
         if kind == Kind.RUBBER_BALL:
             continue
-        told = summary(study)
-        causes = told["causes"]
+        totals = summary(study)
+        causes = totals["causes"]
         assert isinstance(causes, dict)
         rows.append(
             [kind, f"`{method}`", len(study.samples), study.failed, *causes.values(),
-             told["failures_from_first_result"], told["false_contacts"]]
+             totals["failures_from_first_result"], totals["false_contacts"]]
         )  # fmt: skip
     return table(
         [

@@ -67,13 +67,13 @@ def compare(task: Task) -> list[Pair]:
     one, recipe = draw(task), find_recipe(task.kind)
     pose = one.pose
 
-    def begun() -> tuple[Grip, FruitRig, Onset | None]:
+    def approached() -> tuple[Grip, FruitRig, Onset | None]:
         rig = FruitRig(one.fruit, pose, one.unit, one.noise_seed, one.mm_per_px)
         grip = Grip(recipe, rig)
         return grip, rig, grip.approach(one.phase)
 
     closings_mm = [limit.closing_mm for limit in recipe.damage.area]
-    (stepped, _, onset), (grip, rig, _) = begun(), begun()
+    (stepped, _, onset), (grip, rig, _) = approached(), approached()
     if onset is None:
         return []
     steps: list[tuple[float, Contact]] = []
@@ -129,11 +129,11 @@ def bear(task: Task) -> Borne | None:
     cv2.setNumThreads(1)
     one, recipe = draw(task), find_recipe(task.kind)
 
-    def begun() -> tuple[FruitRig, Grip]:
+    def approached() -> tuple[FruitRig, Grip]:
         rig = FruitRig(one.fruit, one.pose, one.unit, one.noise_seed, one.mm_per_px)
         return rig, Grip(recipe, rig)
 
-    _, grip = begun()
+    _, grip = approached()
     onset = grip.approach(one.phase)
     if onset is None:
         return None
@@ -147,7 +147,7 @@ def bear(task: Task) -> Borne | None:
         return not ends_steps(press, recipe)
 
     grip.close(onset, goes_on)
-    rig, grip = begun()
+    rig, grip = approached()
     deepest_mm, more_steps = closed_on(one, recipe, onset, rig, grip)
     speed_mm_s, step_s = recipe.gripper.speed_mm_s, recipe.imaging.settle_s + recipe.imaging.frames_per_step * FRAME_S
     late_mm = one.fruit.width_mm - onset.width_mm
@@ -255,11 +255,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=60, help="fruit of each kind and group")
     parser.add_argument("--processes", type=int, default=2)
-    asked = parser.parse_args()
-    tasks = [Task(kind, group, "tuning", number) for kind in KINDS for group in GROUPS for number in range(asked.count)]
+    options = parser.parse_args()
+    tasks = [
+        Task(kind, group, "tuning", number) for kind in KINDS for group in GROUPS for number in range(options.count)
+    ]
     pairs: list[Pair] = []
     borne: list[Borne] = []
-    for done, (found, force) in enumerate(on_this_machine(both, tasks, asked.processes), 1):
+    for done, (found, force) in enumerate(on_this_machine(both, tasks, options.processes), 1):
         pairs += found
         borne += [] if force is None else [force]
         print(f"\r{done} of {len(tasks)}", end="", file=sys.stderr, flush=True)

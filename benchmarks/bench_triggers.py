@@ -135,19 +135,19 @@ def disagreements(site: Configuration, rows: list[Row], counted: dict[str, float
                 wrong.append(f"sequence {passage.sequence} came twice")
             seen.add(passage.sequence)
             record = read_inspection(connection, passage.sequence, folder)
-            told = record.standing
-            if told is None or record.acknowledged_utc_ms is None:
-                wrong.append(f"sequence {passage.sequence}: not told or not acknowledged in the records")
-            elif (told.outcome, told.trigger_id, sorted(told.reasons)) != (
+            standing = record.standing
+            if standing is None or record.acknowledged_utc_ms is None:
+                wrong.append(f"sequence {passage.sequence}: not published or not acknowledged in the records")
+            elif (standing.outcome, standing.trigger_id, sorted(standing.reasons)) != (
                 passage.decision,
                 passage.trigger_id,
                 sorted(passage.reasons),
             ):
                 wrong.append(
-                    f"sequence {passage.sequence}: {told.outcome} in the records, {passage.decision} at the PLC"
+                    f"sequence {passage.sequence}: {standing.outcome} in the records, {passage.decision} at the PLC"
                 )
-            elif not same(told.area_mm2, passage.area_mm2):
-                wrong.append(f"sequence {passage.sequence}: {told.area_mm2} and {passage.area_mm2} mm²")
+            elif not same(standing.area_mm2, passage.area_mm2):
+                wrong.append(f"sequence {passage.sequence}: {standing.area_mm2} and {passage.area_mm2} mm²")
     decided = Counter(str(passage.decision) for passage, _ in rows if passage.sequence)
     if dict(decided) != counted:
         wrong.append(f"the metrics count {counted}, the PLC {dict(decided)}")
@@ -155,7 +155,7 @@ def disagreements(site: Configuration, rows: list[Row], counted: dict[str, float
 
 
 def same(recorded: float | None, read: float | None) -> bool:
-    """Equal as far as a binary32 register can tell."""
+    """Equal as far as a binary32 register can show."""
     if recorded is None or read is None:
         return recorded is read
     return math.isclose(recorded, read, rel_tol=1e-6)

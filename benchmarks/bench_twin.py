@@ -3,7 +3,7 @@
 usage: bench_twin.py [--real FOLDER] [--side-by-side FOLDER]
 
 FOLDER of --real holds digit_presses and digit_backgrounds (default: ../shared/data beside the checkout). With
---side-by-side real and drawn presses are written next to each other into a folder of yours, for looking only.
+--side-by-side real and drawn presses are written next to each other into a folder of yours, for a visual check.
 """
 
 import argparse
@@ -324,7 +324,7 @@ def to_polar(image: npt.NDArray[np.float32], centre: tuple[float, float]) -> npt
 
 
 def side_by_side(folder: Path, reference: Image, presses: list[Press]) -> None:
-    """Real and drawn presses next to each other, for looking only."""
+    """Real and drawn presses next to each other, for a visual check only."""
     folder.mkdir(parents=True, exist_ok=True)
     for index, press in enumerate(presses):
         sensor = DigitSensor(index)

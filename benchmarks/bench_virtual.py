@@ -2,7 +2,7 @@
 
 Plays stories in several processes until so many triggers, or so many minutes, are over. A story that breaks a law is
 shrunk to the least one that breaks it, and printed; `--story SEED` plays one again. With `--results FILE` every story's
-end is kept there, one a line, and the same command goes on where it stopped; a story that broke a law is played anew.
+end is stored there, one a line, and the same command goes on where it stopped; a story that broke a law is played anew.
 Writes docs/virtual-time.md.
 """
 
@@ -55,7 +55,7 @@ def least(story: Story, law: str) -> Story:
 
 @functools.cache
 def code() -> str:
-    """A checksum of the product's code, by which stories are told apart that were played before and after a change."""
+    """A checksum of the product's code, which separates the stories that were played before and after a change."""
     root = DOCUMENT.parents[1]
     files = [file for room in ("plc_interface", "recipes", "station") for file in sorted((root / room).rglob("*.*"))]
     return f"{zlib.crc32(b''.join(file.read_bytes() for file in files if file.suffix in {'.py', '.yaml'})):08x}"
@@ -82,18 +82,18 @@ def played(seed: int) -> Result:
     }
 
 
-def run(triggers: int, seed: int, minutes: float, workers: int, kept: Path | None) -> None:
+def run(triggers: int, seed: int, minutes: float, workers: int, results_file: Path | None) -> None:
     """Play stories, and write the page."""
     results: list[Result] = []
-    if kept is not None and kept.exists():
-        results = [json.loads(line) for line in kept.read_text(encoding="utf-8").splitlines()]
+    if results_file is not None and results_file.exists():
+        results = [json.loads(line) for line in results_file.read_text(encoding="utf-8").splitlines()]
     done = {result["seed"] for result in results if result["broken"] is None}
     seeds = range(seed, seed + math.ceil(triggers / (FRUITS + LAST_FRUITS)))
     ends_s = time.monotonic() + 60 * minutes
     for result in on_this_machine(played, [each for each in seeds if each not in done], workers):
         results.append(result)
-        if kept is not None:
-            with kept.open("a", encoding="utf-8") as file:
+        if results_file is not None:
+            with results_file.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(result) + "\n")
         if result["broken"] is not None:
             print(f"story {result['seed']}: {result['broken'][1]}\n  least: {result['broken'][2]}", file=sys.stderr)
@@ -171,9 +171,9 @@ if __name__ == "__main__":
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes")
     parser.add_argument("--results", type=Path, metavar="FILE", help="keep every story's end, and go on from them")
     parser.add_argument("--story", type=int, metavar="SEED")
-    asked = parser.parse_args()
+    options = parser.parse_args()
     logging.disable(logging.CRITICAL)
-    if asked.story is not None:
-        again(asked.story)
+    if options.story is not None:
+        again(options.story)
     else:
-        run(asked.triggers, asked.seed, asked.minutes, asked.workers, asked.results)
+        run(options.triggers, options.seed, options.minutes, options.workers, options.results)

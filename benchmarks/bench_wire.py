@@ -1,7 +1,7 @@
 """Triggers over the wire through proxies that delay, cut, split, repeat and corrupt on every link.
 
 Whole stations with the simulated cell and a PLC on the wire, some side by side, play stories of fruits drawn from
-seeds; every other fruit and more has its disturbance. Every fruit is kept at once, so that an interrupted run loses
+seeds; every other fruit and more has its disturbance. Every fruit is stored at once, so that an interrupted run loses
 nothing, and the same command goes on until there are so many triggers. Writes docs/wire.md.
 """
 
@@ -18,10 +18,10 @@ from collections.abc import AsyncGenerator, Iterator
 from pathlib import Path
 
 import sections
-from reliability import link_kept as kept
-from reliability.link_kept import ALARMS_RETURN, Fruit, Story
+from reliability import link_results
 from reliability.link_page import sections_of
 from reliability.link_play import play
+from reliability.link_results import ALARMS_RETURN, Fruit, Story
 from reliability.link_story import FRUITS, LAST_FRUITS, draw
 from reliability.rig import running
 from reliability.routes import Routes
@@ -29,13 +29,13 @@ from reliability.scenario import Expected, Scenario
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "wire.md"
 CHART = DOCUMENT.parent / "images" / "wire.svg"
-KEPT = Path(__file__).resolve().parent / "reliability" / "link_stories.json"
+STORIES_FILE = Path(__file__).resolve().parent / "reliability" / "link_stories.json"
 TRIGGERS = 2000
 LIMIT_MM2 = 50.0
 """Between a sound and a bruised fruit of the twin, as in the kills."""
 _SCENARIO = Scenario(name="links", fault=None, expected=Expected(outcomes=("PASS",)))
-_END_S, _ASKED_AGAIN_S = 60.0, 10.0
-"""A story that is interrupted ends its station within this time; it is asked again as a cancellation may be lost."""
+_END_S, _SIGTERM_EVERY_S = 60.0, 10.0
+"""A story that is interrupted ends its station within this time; SIGTERM is repeated, as a cancellation may be lost."""
 
 
 async def play_here(seed: int, fruits: int) -> bool:
@@ -80,14 +80,14 @@ async def play_apart(seed: int, fruits: int) -> AsyncGenerator[Story, None]:
             with contextlib.suppress(ProcessLookupError):
                 process.terminate()
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(_ASKED_AGAIN_S):
+                async with asyncio.timeout(_SIGTERM_EVERY_S):
                     await process.wait()
 
 
 async def play_all(count: int, seed: int, stations: int, fruits: int) -> None:
-    """Play stories until so many triggers are kept; those that are kept already count."""
+    """Play stories until so many triggers are stored; those that are stored already count."""
     _end_by_sigterm()
-    stories = {story.seed: story for story in kept.read(KEPT).stories}
+    stories = {story.seed: story for story in link_results.read(STORIES_FILE).stories}
     seeds = (each for each in itertools.count(seed) if each not in stories)
 
     async def one_after_the_other(seeds: Iterator[int]) -> None:
@@ -95,7 +95,7 @@ async def play_all(count: int, seed: int, stations: int, fruits: int) -> None:
             async with contextlib.aclosing(play_apart(next(seeds), fruits)) as growing:
                 async for story in growing:
                     stories[story.seed] = story
-                    kept.write(KEPT, list(stories.values()))
+                    link_results.write(STORIES_FILE, list(stories.values()))
                     _show(story, sum(each.triggers for each in stories.values()), count)
 
     await asyncio.gather(*(one_after_the_other(seeds) for _ in range(stations)))
@@ -125,14 +125,14 @@ def main() -> int:
     parser.add_argument("--stations", type=int, default=2, help="side by side")
     parser.add_argument("--fruits", type=int, default=FRUITS, help=f"of a story, before {LAST_FRUITS} sound ones")
     parser.add_argument("--story", type=int, metavar="SEED", help="play this one again, and keep nothing")
-    asked = parser.parse_args()
-    if asked.story is not None:
+    options = parser.parse_args()
+    if options.story is not None:
         with contextlib.suppress(asyncio.CancelledError):
-            return 0 if asyncio.run(play_here(asked.story, asked.fruits)) else 1
+            return 0 if asyncio.run(play_here(options.story, options.fruits)) else 1
         return 1
     with contextlib.suppress(KeyboardInterrupt, asyncio.CancelledError):
-        asyncio.run(play_all(asked.count, asked.seed, asked.stations, asked.fruits))
-    made = kept.read(KEPT)
+        asyncio.run(play_all(options.count, options.seed, options.stations, options.fruits))
+    made = link_results.read(STORIES_FILE)
     sections.write(DOCUMENT, sections_of(made, CHART))
     return 1 if any(story.all_broken for story in made.stories) else 0
 

@@ -30,7 +30,7 @@ USAGE = """usage: ./run bench                  all but the long ones, in turn; t
 """
 
 
-def say(message: str) -> None:
+def report(message: str) -> None:
     """Report progress, apart from a benchmark's own output."""
     print(f"bench: {message}", file=sys.stderr, flush=True)
 
@@ -56,18 +56,18 @@ def run(names: Sequence[str], options: Sequence[str] = ()) -> int:
     signal.signal(signal.SIGINT, lambda number, _frame: interrupted.append(number))  # the benchmark gets it too
     runs, measured, failed = summary.read_runs(), commit(), []
     timed = [float(runs[name]["minutes"]) for name in names if name in runs]
-    say(f"{len(names)} to run; the {len(timed)} that were timed before took {sum(timed):.1f} min")
+    report(f"{len(names)} to run; the {len(timed)} that were timed before took {sum(timed):.1f} min")
     for number, name in enumerate(names, 1):
         before = f"{os.getloadavg()[0]:.1f}"
         took = f"took {runs[name]['minutes']} min the last time" if name in runs else "not timed yet"
-        say(f"{number} of {len(names)}: {name}, load {before}; {took}")
+        report(f"{number} of {len(names)}: {name}, load {before}; {took}")
         began_s = time.monotonic()
         code = subprocess.run([sys.executable, str(FOLDER / f"bench_{name}.py"), *options], check=False).returncode
         minutes = f"{(time.monotonic() - began_s) / 60:.1f}"
         if interrupted:
-            say(f"{name} was interrupted")
+            report(f"{name} was interrupted")
             return 130
-        say(f"{name} {f'FAILED with exit code {code}' if code else 'is done'} after {minutes} min")
+        report(f"{name} {f'FAILED with exit code {code}' if code else 'is done'} after {minutes} min")
         if code:
             failed.append(name)
         elif not options:
@@ -77,15 +77,15 @@ def run(names: Sequence[str], options: Sequence[str] = ()) -> int:
         try:
             summary.write()
         except LookupError as error:
-            say(f"docs/benchmarks.md cannot be written: {error}")
+            report(f"docs/benchmarks.md cannot be written: {error}")
             failed.append(name)
     if failed:
-        say(f"failed: {', '.join(dict.fromkeys(failed))}")
+        report(f"failed: {', '.join(dict.fromkeys(failed))}")
     return 1 if failed else 0
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run what was asked for, or list what there is."""
+    """Run what was requested, or list what there is."""
     # As `station/__init__.py` has it for every process of the station: a benchmark may import numpy before, and two
     # processes whose matrix products have two threads each on two cores wait for each other most of their time.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

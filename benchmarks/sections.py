@@ -12,7 +12,7 @@ def with_rows(document: Path, name: str, lines: Sequence[str], keys: int) -> lis
         document: as `write` has it.
         name: of the section.
         lines: a table with the same columns; its rows take the place of those with the same first cells.
-        keys: how many cells say which row it is.
+        keys: how many cells identify the row.
 
     Raises:
         SystemExit: the document does not have the section exactly once, or its columns are others.
@@ -21,8 +21,8 @@ def with_rows(document: Path, name: str, lines: Sequence[str], keys: int) -> lis
     if len(found) != 1 or found[0].splitlines()[:2] != lines[:2]:
         raise SystemExit(f"{document}: expected one section {name} with the columns {lines[0]}: make all of its rows")
     made = {tuple(line.split("|")[1 : 1 + keys]): line for line in lines}
-    kept = [made.pop(tuple(line.split("|")[1 : 1 + keys]), line) for line in found[0].splitlines()]
-    return [*kept, *made.values()]
+    rows = [made.pop(tuple(line.split("|")[1 : 1 + keys]), line) for line in found[0].splitlines()]
+    return [*rows, *made.values()]
 
 
 def write(document: Path, sections: Mapping[str, Sequence[str]]) -> None:

@@ -1,4 +1,4 @@
-"""The station's command line, called in this process."""
+"""The station's command line, run in this process."""
 
 from click.testing import CliRunner
 
@@ -7,7 +7,7 @@ from station.errors import StationError
 
 
 def call(*arguments: object) -> tuple[int, str]:
-    """Call a command, and return its exit code and what it said; of what it refuses, that alone."""
+    """Run a command; return its exit code and its output, or the refusal's text alone."""
     done = CliRunner().invoke(cli, [str(argument) for argument in arguments])
     if isinstance(done.exception, StationError):
         return done.exception.exit_code, str(done.exception)

@@ -1,4 +1,4 @@
-"""Rules and fixtures of every test: nothing may outlive it, and a missing tool is an error where CI says so."""
+"""Rules and fixtures of every test: nothing may outlive it, and a missing tool is an error where CI=true."""
 
 import asyncio
 import functools
@@ -26,7 +26,7 @@ from tests.ports import free_port, free_ports
 from tests.tools import missing, required
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
-KEPT = (("hmi_pages",), ("hmi",), ("plc_interface/registers/generate", "runtime/test_plc_program.py"))
+TOGETHER = (("hmi_pages",), ("hmi",), ("plc_interface/registers/generate", "runtime/test_plc_program.py"))
 """Tests that share what takes long to make: a whole station that runs, another one, the parsed Structured Text."""
 GRACE_S = 3.0
 
@@ -58,7 +58,7 @@ def pytest_collection_finish() -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep a folder's tests together, in whatever order they are, and begin a worker's share with tests of `KEPT`.
+    """Keep a folder's tests together, in any order, and begin a worker's share with tests of `TOGETHER`.
 
     A worker's share begins so many items after the one before (xdist's `worksteal`), and others take from its end: such
     tests stay with one worker, which makes what they share once.
@@ -68,11 +68,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         order.setdefault(item.path.parent, len(order))
     items.sort(key=lambda item: order[item.path.parent])
     workers, count = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")), len(items)
-    for number, names in enumerate(KEPT):
+    for number, names in enumerate(TOGETHER):
         paths = {Path(__file__).parent / name for name in names}
         tests = [item for item in items if not paths.isdisjoint((item.path, *item.path.parents))]
-        kept = {id(item) for item in tests}
-        items[:] = [item for item in items if id(item) not in kept]
+        moved = {id(item) for item in tests}
+        items[:] = [item for item in items if id(item) not in moved]
         begin = number * count // workers
         items[begin:begin] = tests
 
@@ -206,19 +206,19 @@ def interned(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 @pytest.fixture
 def unused_port() -> int:
-    """A loopback port that nobody listens on."""
+    """A free loopback port."""
     return free_port()
 
 
 @pytest.fixture
 def unused_ports() -> Callable[[int], list[int]]:
-    """Gives so many different loopback ports that nobody listens on."""
+    """Return a function that gives so many different free loopback ports."""
     return free_ports
 
 
 @pytest.fixture(scope="session")
 def real_images() -> Path:
-    """The folder of real DIGIT images, which lies beside the project and is no part of it."""
+    """The folder of real DIGIT images, which is beside the project and no part of it."""
     folder = SHARED / "data"
     if not (folder / "digit_presses").is_dir():
         pytest.skip("the folder of real DIGIT images is not beside this checkout")

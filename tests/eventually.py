@@ -1,4 +1,4 @@
-"""Polling with a deadline: `eventually` blocks, `until` is awaited; a failure says what was waited for."""
+"""Polling with a deadline: `eventually` blocks, `until` is awaited; a failure names what was waited for."""
 
 import asyncio
 import inspect

@@ -23,7 +23,7 @@ _ports = _own_ports()
 
 
 def free_ports(count: int) -> list[int]:
-    """Return different ports that nobody has; no other worker gets them, nor this one before hundreds of others."""
+    """Return different free ports; no other worker gets them, nor this one before hundreds of others."""
     found: list[int] = []
     while len(found) < count:
         port = next(_ports)
@@ -34,5 +34,5 @@ def free_ports(count: int) -> list[int]:
 
 
 def free_port() -> int:
-    """Return a port that nobody has, as `free_ports`."""
+    """Return a free port, as `free_ports`."""
     return free_ports(1)[0]

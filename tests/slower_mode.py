@@ -3,4 +3,4 @@
 from typing import Any
 
 SLOWER_MODE: dict[str, Any] = {"do": "set", "device": "camera", "fault": "slow", "amount": 2.0}
-"""What to ask the twin's console."""
+"""The request to the twin's console."""

@@ -71,15 +71,15 @@ for _ in range(80):
     lasting.append(size // 1_000 * b"a")
 full = psutil.Process().memory_info().rss
 images.clear()
-kept = psutil.Process().memory_info().rss
+retained = psutil.Process().memory_info().rss
 return_freed_memory()
-print(full - kept, kept - psutil.Process().memory_info().rss)
+print(full - retained, retained - psutil.Process().memory_info().rss)
 """
 
 
 def test_what_was_freed_between_lasting_objects_is_returned_when_asked():
     command = [sys.executable, "-c", RETURNED]
-    said = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
-    retained, returned = (int(each) / 1e6 for each in said.split())
+    output = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+    retained, returned = (int(each) / 1e6 for each in output.split())
     assert retained < 10
     assert returned > 70

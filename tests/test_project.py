@@ -66,7 +66,7 @@ def test_a_lock_lists_what_its_packages_need_as_it_is_installed_without_looking_
     assert len(pinned) > 30
 
 
-@pytest.mark.parametrize("lock", [*LOCKS, "benchmarks/looking/nicegui.lock"])
+@pytest.mark.parametrize("lock", [*LOCKS, "benchmarks/hmi_load/nicegui.lock"])
 def test_a_lock_has_hashes_and_no_address(lock):
     text = (ROOT / lock).read_text()
     assert "://" not in text

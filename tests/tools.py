@@ -10,7 +10,7 @@ import pytest
 def missing(what: str) -> NoReturn:
     """Skip a test for want of what `run` installs; fail it where CI promises that nothing is missing."""
     if os.environ.get("CI") == "true":
-        pytest.fail(f"{what} is missing, and CI=true says that nothing may be", pytrace=False)
+        pytest.fail(f"{what} is missing, which is an error where CI=true", pytrace=False)
     pytest.skip(f"{what} is missing on this machine")
 
 

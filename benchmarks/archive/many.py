@@ -126,7 +126,7 @@ def _rows(numbers: range) -> Iterator[tuple[object, ...]]:
     for number in numbers:
         lot, outcome, reasons = made(number)
         area = 20.0 + number % 60
-        told = json.dumps({
+        outcome_json = json.dumps({
             "sequence": number, "trigger_id": number % 65_535 + 1, "outcome": outcome, "reasons": reasons,
             "late": False, "partial": False, "simulated": False, "area_mm2": area, "area_px": 40_000, "closing_mm": 4.0,
             "confidence": 0.9, "recipe_number": 3, "recipe_checksum": 1, "began_utc_ms": _began(number),
@@ -134,5 +134,5 @@ def _rows(numbers: range) -> Iterator[tuple[object, ...]]:
         })  # fmt: skip
         yield (
             number, number % 65_535 + 1, lot, _RECIPES[fruit_of(number)], _began(number), _began(number) + 2900,
-            outcome, json.dumps(reasons), area, outcome, told, _began(number) + 2950, _began(number) + 3000,
+            outcome, json.dumps(reasons), area, outcome, outcome_json, _began(number) + 2950, _began(number) + 3000,
         )  # fmt: skip

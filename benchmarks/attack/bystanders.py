@@ -32,10 +32,10 @@ REPLY_BYTES = 9 + 2 * 20
 TOKEN = re.compile(r'data-token="([^"]+)"')
 
 
-def until_told(once: Callable[[], None], period_s: float, enough: Callable[[], bool] = lambda: True) -> None:
+def repeat(once: Callable[[], None], period_s: float, enough: Callable[[], bool] = lambda: True) -> None:
     """Do something once a period until the input has ended and it is enough; a missed period is left out.
 
-    It has begun after the first time: a client then has the connection that an attack is not to take.
+    It has started after the first time: a client then has the connection that an attack is not to take.
     """
     once()
     print("begun", flush=True)
@@ -72,7 +72,7 @@ def scan(port: int) -> dict[str, list[float] | int]:
         else:
             took_ms.append(1000 * (time.perf_counter() - began_s))
 
-    until_told(once, SCAN_S)
+    repeat(once, SCAN_S)
     if client is not None:
         client.close()
     return {"took_ms": took_ms, "errors": errors}
@@ -90,7 +90,7 @@ class Browser:
         self._url, self._source = urlsplit(url), (source, 0)
         self.cookie = ""
 
-    def ask(
+    def request(
         self, method: str, path: str, body: bytes | str | None = None, headers: dict[str, str] | None = None
     ) -> tuple[int, str]:
         """Return a response's status and body.
@@ -121,7 +121,7 @@ class Browser:
             OSError: there is no page with one.
             HTTPException: no whole response.
         """
-        status, page = self.ask("GET", "/people")
+        status, page = self.request("GET", "/people")
         found = TOKEN.search(page)
         if found is None:
             raise OSError(f"a page without a token: {status}")
@@ -135,7 +135,7 @@ class Browser:
             HTTPException: no whole response.
         """
         body = urlencode({"csrf": self.token(), **form})
-        return self.ask("POST", path, body, {"Content-Type": "application/x-www-form-urlencoded"})[0]
+        return self.request("POST", path, body, {"Content-Type": "application/x-www-form-urlencoded"})[0]
 
 
 async def _stopping(endpoint: str) -> bool:
@@ -169,7 +169,7 @@ def panel(url: str, endpoint: str, name: str, pin: str) -> dict[str, list[float]
             failed += 1
             print(f"panel: {error!r}", file=sys.stderr)
 
-    until_told(once, PAUSE_S, lambda: bool(stop_s or failed))
+    repeat(once, PAUSE_S, lambda: bool(stop_s or failed))
     return {"stop_s": stop_s, "failed": failed}
 
 

@@ -83,7 +83,7 @@ class Row(NamedTuple):
         """Faults seen during and after the attack, in words; empty if there are none."""
         process = self.process
         grown_mb, left = process.after_mb - process.before_mb, process.after_files - process.before_files
-        said = (
+        faults = (
             (bool(self.found.wrong), self.found.wrong),
             (self.errors > 0, f"{self.errors} scans without an answer"),
             (self.p99_ms > LONGEST_P99_MS, "p99 is too long"),
@@ -93,7 +93,7 @@ class Row(NamedTuple):
             (grown_mb > MOST_GROWN_MB, f"{grown_mb:.0f} MB more than before"),
             (left > MOST_FILES_LEFT, f"{left} descriptors more than before"),
         )
-        return [what for so, what in said if so]
+        return [what for so, what in faults if so]
 
 
 def markdown(rows: Sequence[Row], seconds: float, load: tuple[float, float]) -> str:

@@ -99,8 +99,8 @@ def wrong_count(source: random.Random) -> Malformed:
 def wrong_byte_count(source: random.Random) -> Malformed:
     """A byte count that contradicts the number of registers."""
     count = source.randint(1, 20)
-    told = source.choice([each for each in range(256) if each != 2 * count])
-    return Malformed("byte count", _frame(source, struct.pack(">BHHB", 16, 0, count, told) + bytes(2 * count)), 3)
+    byte_count = source.choice([each for each in range(256) if each != 2 * count])
+    return Malformed("byte count", _frame(source, struct.pack(">BHHB", 16, 0, count, byte_count) + bytes(2 * count)), 3)
 
 
 def unmapped(source: random.Random) -> Malformed:

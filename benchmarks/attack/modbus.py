@@ -22,7 +22,7 @@ BUSY = 6
 _FRAME_ENDS_S = 6.0
 """A connection with half a frame is ended within 5 s."""
 _DEAF_END_S = 40.0
-"""Until then all that the kernels keep is answered, and nobody has read it for 5 s, on a busy machine too."""
+"""Until then all that the kernels buffer is answered, and no client has read it for 5 s, on a busy machine too."""
 
 
 def _frame(message: bytes, transaction: int = 1) -> bytes:
@@ -59,7 +59,7 @@ class Wire:
 
 
 def silent_one(target: Target) -> Found:
-    """One machine that connects and asks nothing."""
+    """One machine that connects and requests nothing."""
     return silent(target.modbus, SILENT, (STRANGER,), target.seconds)
 
 
@@ -130,7 +130,7 @@ def pipelining(target: Target) -> Found:
 
 
 def never_read(target: Target) -> Found:
-    """Requests whose answers nobody takes."""
+    """Requests whose answers are not read."""
     taken = 0
     with crowd(target.modbus, DEAF, STRANGERS) as clients:
         until_s = time.monotonic() + _DEAF_END_S

@@ -34,7 +34,7 @@ ORDERS = {
 }
 """Without the fields that they need, so that who may gets 400 or 404 and nothing changes."""
 MOST_ROWS = 60
-"""Of the audit trail, of an attack that nobody is logged in for."""
+"""Of the audit trail, of an attack without a login."""
 FOREIGN = ("evil.example", f"{HOST}.evil.example", f"{HOST}:80@evil", "", "localhost.evil", f"[{HOST}]", f"evil/{HOST}")
 
 
@@ -53,7 +53,7 @@ def _only(statuses: Counter[int], *right: int) -> str:
 
 
 def silent_one(target: Target) -> Found:
-    """One machine that connects and asks nothing."""
+    """One machine that connects and requests nothing."""
     return silent(target.port_of(target.pages), CROWD, (STRANGER,), target.seconds)
 
 
@@ -96,9 +96,9 @@ def _streams(target: Target, sources: tuple[str, ...]) -> Found:
             with contextlib.suppress(OSError):
                 while time.monotonic() < until_s:
                     got += panel.recv(65_536)
-    told = got.count(b"data: ")
-    seen = f"{at_start} open; events on the panel's stream: {told}"
-    return Found(STREAMS, seen, "" if told > 1 else "the panel's stream does not go on")
+    events = got.count(b"data: ")
+    seen = f"{at_start} open; events on the panel's stream: {events}"
+    return Found(STREAMS, seen, "" if events > 1 else "the panel's stream does not go on")
 
 
 def streams_one(target: Target) -> Found:
@@ -128,7 +128,7 @@ def _audit_rows(target: Target) -> int:
 
 
 def clean_flood(target: Target) -> Found:
-    """Orders that need nobody to be logged in, and leave a row in the audit trail."""
+    """Orders that need no login, and leave a row in the audit trail."""
     before, statuses = _audit_rows(target), Counter[int]()
     visitor, until_s = Browser(target.pages, STRANGER), time.monotonic() + target.seconds
     while time.monotonic() < until_s:
@@ -161,21 +161,21 @@ def forged_forms(target: Target) -> Found:
     person.post("/people/log-in", name=name, pin=pin)
     used = person.token()
     kind = {"Content-Type": "application/x-www-form-urlencoded"}
-    person.ask("POST", "/order", f"csrf={used}&order=start", kind)
+    person.request("POST", "/order", f"csrf={used}&order=start", kind)
     bodies = ["order=stop", *(f"csrf={token}&order=stop" for token in ("", "x" * 40, other.token(), used))]
-    statuses = Counter(person.ask("POST", "/order", body, kind)[0] for body in bodies)
+    statuses = Counter(person.request("POST", "/order", body, kind)[0] for body in bodies)
     for foreign in ({"Origin": "http://evil.example"}, {"Sec-Fetch-Site": "cross-site"}):
-        statuses[person.ask("POST", "/order", f"csrf={person.token()}&order=stop", {**kind, **foreign})[0]] += 1
+        statuses[person.request("POST", "/order", f"csrf={person.token()}&order=stop", {**kind, **foreign})[0]] += 1
     return Found(statuses.total(), _counted(statuses), _only(statuses, 400, 403, 409))
 
 
 def forged_tokens(target: Target) -> Found:
-    """API tokens that nobody made."""
+    """API tokens that were never issued."""
     before, statuses = _audit_rows(target), Counter[int]()
     until_s, visitor = time.monotonic() + target.seconds, Browser(target.pages, STRANGER)
     while time.monotonic() < until_s:
         token = f"fst_{statuses.total():043d}"
-        statuses[visitor.ask("GET", "/api/v1/lots", headers={"Authorization": f"Bearer {token}"})[0]] += 1
+        statuses[visitor.request("GET", "/api/v1/lots", headers={"Authorization": f"Bearer {token}"})[0]] += 1
     rows = _audit_rows(target) - before
     wrong = _only(statuses, 401) or (f"more than {MOST_ROWS} rows" if rows > MOST_ROWS else "")
     return Found(statuses.total(), f"{_counted(statuses)}; {rows} rows, the panel's own included", wrong)
@@ -186,7 +186,7 @@ def hostile_numbers(target: Target) -> Found:
     token = {"Authorization": f"Bearer {target.token}", "Content-Type": "application/json"}
     bodies = ["1e999", "-1e999", "NaN", "[" * 5000, '"' + "x" * 100_000 + '"', "{}", '"\\u0000"', "null" * 9]
     visitor = Browser(target.pages, STRANGER)
-    statuses = Counter(visitor.ask("PUT", "/api/v1/lots/x", f'{{"grower":{body}}}', token)[0] for body in bodies)
+    statuses = Counter(visitor.request("PUT", "/api/v1/lots/x", f'{{"grower":{body}}}', token)[0] for body in bodies)
     return Found(len(bodies), _counted(statuses), _only(statuses, 400, 413, 422))
 
 
@@ -196,7 +196,7 @@ def foreign_hosts(target: Target) -> Found:
     statuses: Counter[int] = Counter()
     for name in FOREIGN:
         with contextlib.suppress(http.client.HTTPException):
-            statuses[visitor.ask("GET", "/", headers={"Host": name})[0]] += 1
+            statuses[visitor.request("GET", "/", headers={"Host": name})[0]] += 1
     return Found(len(FOREIGN), _counted(statuses), _only(statuses, 400, 421))
 
 
@@ -206,7 +206,7 @@ def large_bodies(target: Target) -> Found:
     visitor = Browser(target.pages, STRANGER)
     for size in (300_000, 10_000_000) * 5:
         try:
-            ends[str(visitor.ask("POST", "/language", b"x" * size)[0])] += 1
+            ends[str(visitor.request("POST", "/language", b"x" * size)[0])] += 1
         except OSError:
             ends["closed"] += 1
     seen = ", ".join(f"{count} x {end}" for end, count in ends.items())
@@ -214,13 +214,13 @@ def large_bodies(target: Target) -> Found:
 
 
 def silent_metrics(target: Target) -> Found:
-    """Silent connections to metrics and health; a monitor at the machine itself asks meanwhile."""
+    """Silent connections to metrics and health; a monitor at the machine itself sends requests meanwhile."""
     with crowd(target.metrics, CROWD, STRANGERS) as clients:
         most = still_open(clients)
         statuses: Counter[int] = Counter()
         until_s, monitor = time.monotonic() + target.seconds, Browser(f"http://127.0.0.1:{target.metrics}", "127.0.0.1")
         while time.monotonic() < until_s:
-            statuses[monitor.ask("GET", "/livez")[0]] += 1
+            statuses[monitor.request("GET", "/livez")[0]] += 1
             time.sleep(0.1)
         left = still_open(clients)
     return Found(CROWD, f"{most} open at first, {left} at the end; /livez: {_counted(statuses)}", _only(statuses, 200))

@@ -1,4 +1,4 @@
-"""Document of the constants: its sections, each written by one part of the benchmark and kept by the others."""
+"""Document of the constants: its sections, each written by one part of the benchmark and left by the others."""
 
 import os
 from collections.abc import Sequence
@@ -37,13 +37,13 @@ SECTIONS = ("Data sets and cost", "Constants", "Stages", "Fit", "Reliability", "
 
 def write_section(name: str, lines: Sequence[str]) -> None:
     """Write one section of the document and keep the others."""
-    kept = {}
+    texts = {}
     if DOCUMENT.exists():
         for part in DOCUMENT.read_text().split("\n## ")[1:]:
             title, _, text = part.partition("\n")
-            kept[title] = text.strip()
-    kept[name] = "\n".join(lines).strip()
-    sections = [f"## {title}\n\n{kept[title]}\n" for title in SECTIONS if title in kept]
+            texts[title] = text.strip()
+    texts[name] = "\n".join(lines).strip()
+    sections = [f"## {title}\n\n{texts[title]}\n" for title in SECTIONS if title in texts]
     DOCUMENT.write_text("\n".join([f"{TITLE}\n{INTRODUCTION}", *sections]))
     print("\n".join(lines), flush=True)
 

@@ -1,4 +1,4 @@
-"""Fixed numbers: all that the source of the vision declares beside the fitted constants, with what it says of each."""
+"""Fixed numbers: all that the source of the vision declares beside the fitted constants, with its comment on each."""
 
 import ast
 from collections.abc import Iterator

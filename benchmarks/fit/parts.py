@@ -131,7 +131,7 @@ def groups(part: Part, images: Path, cache: Path) -> Groups:
     for kind in KINDS:
         presses = [press for press in soft if press.group == kind]
         found[kind.replace("_", " ")] = Group(presses, 0.5, followed=True)
-    # As in an analysis of single images, where no earlier step says what touches.
+    # As in an analysis of single images, where no earlier step shows what touches.
     found |= {
         "fruit alone": Group(fruit, 0.25),
         "bruised alone": Group(bruised, 0.25),

@@ -16,10 +16,10 @@ STEP_S = 240
 BLOCK_S = 486 * HOUR_S
 """As promtool makes the longest block that Prometheus keeps at 400 days of retention, a tenth: 2 h * 3^5."""
 POINTS = 640
-"""Of a curve: Grafana asks for one a pixel, and the board's panels are a third of a screen of 1920 wide."""
+"""Of a curve: Grafana queries one a pixel, and the board's panels are a third of a screen of 1920 wide."""
 RUNS = 5
 NOW_ONLY = "station_alarms_active"
-"""Asked for at one moment alone, so only its last day is made: it is two thirds of all series."""
+"""Queried at one moment alone, so only its last day is made: it is two thirds of all series."""
 FRUITS = ("strawberry", "raspberry", "blueberry")
 
 Gauge = tuple[str, dict[str, str], float, float]

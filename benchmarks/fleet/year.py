@@ -143,7 +143,7 @@ def measure(
         queries: by the panel's title, with Grafana's macros.
         days: of the season.
         stations: how many.
-        expand: `monitoring.asking.sql`.
+        expand: `monitoring.queries.sql`.
     """
     chosen = {"station": [f"station-{number}" for number in range(1, stations + 1)], "fruit": list(FRUITS)}
     with server.connect() as connection:

@@ -1,1 +1,1 @@
-"""A real Prometheus, a demonstration that it scrapes, a month that never was, and what is asked of them."""
+"""A real Prometheus, a demonstration that it scrapes, a month that never was, and the queries to them."""

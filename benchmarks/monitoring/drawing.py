@@ -1,4 +1,4 @@
-"""A dashboard's panels, drawn from what Prometheus and PostgreSQL answer, in Grafana's places: to be looked at.
+"""A dashboard's panels, drawn from what Prometheus and PostgreSQL answer, in Grafana's places, for a visual check.
 
 This is not Grafana: it shows that a panel has the right data, unit and legend, not how Grafana renders it.
 """
@@ -16,8 +16,8 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from .asking import Panel
 from .prometheus import Series
+from .queries import Panel
 
 _CELL_IN, _ROW_IN = 0.62, 0.36
 _COLORS = ("#1f4e79", "#c55a11", "#2e7d32", "#7b1fa2", "#00838f", "#8d6e63", "#b3261e", "#5d6d00", "#455a64", "#ad1457")
@@ -37,17 +37,17 @@ class Rows(NamedTuple):
 
 
 Answer = list[Series] | Rows
-Ask = Callable[[Panel, dict[str, Any]], Answer]
-"""Asks one of a panel's targets: over time, or once where the panel is a number or a table."""
+Query = Callable[[Panel, dict[str, Any]], Answer]
+"""Queries one of a panel's targets: over time, or once where the panel is a number or a table."""
 
 
-def draw(board: dict[str, Any], panels: Sequence[Panel], ask: Ask, file: Path, title: str) -> None:
+def draw(board: dict[str, Any], panels: Sequence[Panel], query: Query, file: Path, title: str) -> None:
     """Draw a whole dashboard as one picture.
 
     Args:
         board: its JSON.
         panels: its panels.
-        ask: answers them.
+        query: answers them.
         file: the PNG.
         title: above it.
     """
@@ -69,7 +69,7 @@ def draw(board: dict[str, Any], panels: Sequence[Panel], ask: Ask, file: Path, t
             )  # fmt: skip
             axes = figure.add_axes(box)
             axes.set_title(panel.title, loc="left")
-            answers = [(target, ask(panel, target)) for target in panel.targets]
+            answers = [(target, query(panel, target)) for target in panel.targets]
             _DRAWN[panel.data["type"]](axes, panel, answers)
         figure.savefig(file, dpi=80)
 
@@ -174,15 +174,15 @@ def _over_time(axes: Axes) -> None:
 def _number(axes: Axes, panel: Panel, answers: list[tuple[dict[str, Any], Answer]]) -> None:
     axes.set_axis_off()
     unit = panel.data["fieldConfig"]["defaults"]["unit"]
-    told = [
+    numbers = [
         (_name(target, each), each.points[-1][1])
         for target, answer in answers
         if isinstance(answer, list)
         for each in answer
     ]
-    told += [(answer.columns[0], float(answer.rows[0][0])) for _, answer in answers if isinstance(answer, Rows)]
-    for number, (name, value) in enumerate(told):
-        x = (number + 0.5) / len(told)
+    numbers += [(answer.columns[0], float(answer.rows[0][0])) for _, answer in answers if isinstance(answer, Rows)]
+    for number, (name, value) in enumerate(numbers):
+        x = (number + 0.5) / len(numbers)
         text = name if unit == "none" else value_of(unit, value)
         axes.text(x, 0.55, text, ha="center", va="center", fontsize=13 if len(text) < 12 else 9, color=_COLORS[0])
         axes.text(x, 0.05, "" if unit == "none" else name, ha="center", va="center", fontsize=6.5, color="#555555")

@@ -1,4 +1,4 @@
-"""Rules over a history: what would have been recorded, and who would have been told of what, and when."""
+"""Rules over a history: what would have been recorded, and which alerts would have fired when."""
 
 from collections import defaultdict
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ _POINTS = 10_000
 """Fewer than the 11,000 that Prometheus answers at once."""
 
 
-class Told(NamedTuple):
+class FiredAlert(NamedTuple):
     """One alert as a person would have got it."""
 
     alert: str
@@ -63,7 +63,7 @@ def over(prometheus: Prometheus, expr: str, plan: Plan) -> list[Series]:
     return [Series(dict(labels), points) for labels, points in found.items()]
 
 
-def told(prometheus: Prometheus, plan: Plan) -> list[Told]:
+def fired_alerts(prometheus: Prometheus, plan: Plan) -> list[FiredAlert]:
     """Every alert that would have fired, the Watchdog aside, in the order of time.
 
     Args:
@@ -71,7 +71,7 @@ def told(prometheus: Prometheus, plan: Plan) -> list[Told]:
         plan: of the history.
     """
     found = [
-        Told(name, series.labels, begin_s, end_s)
+        FiredAlert(name, series.labels, begin_s, end_s)
         for name, rule in shipped_alerts().items()
         if name != "Watchdog"
         for series in over(prometheus, rule["expr"], plan)
@@ -128,7 +128,7 @@ NO_COMPACTION = (
 
 
 def _levels(rules: list[dict[str, str]]) -> Iterator[list[dict[str, str]]]:
-    """The rules of a group, apart where one asks for another that is recorded before it."""
+    """The rules of a group, apart where one uses another that is recorded before it."""
     level: list[dict[str, str]] = []
     for rule in rules:
         if any(other["record"] in rule["expr"] for other in level):

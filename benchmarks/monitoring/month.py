@@ -1,4 +1,4 @@
-"""A line's history that never was: told to the station's own `Metrics` fruit by fruit, sampled as Prometheus would.
+"""A line's history that never was: given to the station's own `Metrics` fruit by fruit, sampled as Prometheus would.
 
 What is named and labelled is therefore what the station names and labels. The line works from 6 to 22 h, lots take two
 hours, and each grower's fruit is a little better or worse than another's. Things that are no trouble happen too: the
@@ -50,7 +50,7 @@ class Trouble(NamedTuple):
     end_s: float
     """From the history's begin; then the lot is through, the gel or the sensor is changed."""
     alerts: tuple[str, ...]
-    """What has to be told, and nothing else."""
+    """The alerts that have to fire, and no others."""
 
 
 def troubles(*days: int) -> tuple[Trouble, ...]:
@@ -179,11 +179,11 @@ class Line:
         judged = outcome != "NO_RESULT"
         spread = math.exp(self._random.gauss(0.45 if outcome == "FAIL" else 0.0, 0.2))
         seconds = 6.0 + abs(self._random.gauss(0.0, 0.8))
-        told = Outcome.model_construct(  # pyrefly: ignore[missing-argument] (what the metrics read)
+        concluded = Outcome.model_construct(  # pyrefly: ignore[missing-argument] (what the metrics read)
             outcome=outcome, reasons=reasons, late=self._random.random() < 0.0005, duration_ms=round(1000 * seconds),
             area_mm2=_AREAS_MM2[kind] * spread if judged else None, closing_mm=4.0 * spread if judged else None,
         )  # fmt: skip
-        self._metrics.inspection(kind, told, PHASES, _DEADLINE_S)
+        self._metrics.inspection(kind, concluded, PHASES, _DEADLINE_S)
         if not judged:
             self._metrics.pressed_again(kind)
         self._metrics.frame("good", _FRAMES)
@@ -215,10 +215,10 @@ class Line:
         waiting = round(away_s / 60 * FRUIT_A_MINUTE) if away else self._random.randrange(3)
         now_ms = time.time_ns() // 1_000_000
         oldest = now_ms - round(1000 * (away_s if away else 1.0)) if waiting else None
-        told = DestinationStatus(
+        destination = DestinationStatus(
             connected=not away, told=0, refused=0, waiting=waiting, oldest_utc_ms=oldest, error=None
         )
-        return OutboxStatus(utc_ms=now_ms, destinations={"postgresql": told})
+        return OutboxStatus(utc_ms=now_ms, destinations={"postgresql": destination})
 
 
 def write_history(plan: Plan, folder: Path, report: Callable[[str], None] = lambda _: None) -> set[tuple[str, str]]:

@@ -31,7 +31,7 @@ class Series(NamedTuple):
 
 
 class UnansweredError(Exception):
-    """Prometheus refused a question, and says why."""
+    """Prometheus refused a query, with its reason."""
 
 
 def missing() -> str | None:
@@ -47,7 +47,7 @@ def promtool(*arguments: object, given: str = "") -> str:
         given: what it reads from its input.
 
     Raises:
-        RuntimeError: it complains; with what it said.
+        RuntimeError: it failed; with its output.
     """
     command = ["promtool", *map(str, arguments)]
     done = subprocess.run(command, input=given, capture_output=True, text=True, check=False, timeout=600)
@@ -57,7 +57,7 @@ def promtool(*arguments: object, given: str = "") -> str:
 
 
 def write_configuration(folder: Path, interval: str, targets: dict[str, str]) -> Path:
-    """The shipped configuration with a pace and stations of one's own, and nobody who is told.
+    """The shipped configuration with a pace and stations of one's own, and no receiver of alerts.
 
     Args:
         folder: for the files.
@@ -96,7 +96,7 @@ class Prometheus:
         Raises:
             UnansweredError: the expression is wrong.
         """
-        found = self._ask("query", query=expr, **({} if at_s is None else {"time": at_s}))
+        found = self._query("query", query=expr, **({} if at_s is None else {"time": at_s}))
         if found["resultType"] == "scalar":
             return [Series({}, [_point(found["result"])])]
         return [Series(each["metric"], [_point(each["value"])]) for each in found["result"]]
@@ -113,12 +113,12 @@ class Prometheus:
         Raises:
             UnansweredError: the expression is wrong, or has too many points.
         """
-        found = self._ask("query_range", query=expr, start=begin_s, end=end_s, step=step_s)
+        found = self._query("query_range", query=expr, start=begin_s, end=end_s, step=step_s)
         return [Series(each["metric"], [_point(pair) for pair in each["values"]]) for each in found["result"]]
 
     def names(self) -> set[str]:
         """Of all metrics and recorded series that it has of stations."""
-        return {each["__name__"] for each in self._ask("series", **{"match[]": '{station!=""}'})}
+        return {each["__name__"] for each in self._query("series", **{"match[]": '{station!=""}'})}
 
     def get(self, what: str) -> Any:
         """Another part of its interface, as `rules`.
@@ -126,9 +126,9 @@ class Prometheus:
         Args:
             what: below /api/v1/.
         """
-        return self._ask(what)
+        return self._query(what)
 
-    def _ask(self, what: str, **fields: object) -> Any:
+    def _query(self, what: str, **fields: object) -> Any:
         body = urllib.parse.urlencode(fields).encode() or None
         request = urllib.request.Request(f"{self.address}/api/v1/{what}", body)
         try:

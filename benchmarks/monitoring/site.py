@@ -28,7 +28,7 @@ SEED = 71
 WEEK = "3s"
 """How long a week is for a demonstration, which has not been running for one."""
 _LIMIT_S = 400.0
-"""Before a test's own limit, so that the logs are told."""
+"""Before a test's own limit, so that the logs are printed."""
 _PATIENT = """
 import functools
 from station.supervision import programs
@@ -99,7 +99,7 @@ def demonstration(folder: Path, server: Any, fruits: int, host: str) -> Iterator
         _until(demo, database.exists, folder)
         at_home = {**environment, "STATION_HOME": str(home)}
         stack.enter_context(_process([*station, "outbox", "run"], folder / "outbox.log", at_home))
-        _until(demo, lambda: _decided(prometheus) >= fruits and _told(server) >= fruits, folder)
+        _until(demo, lambda: _decided(prometheus) >= fruits and _published(server) >= fruits, folder)
         _until(demo, lambda: _scraped_often(prometheus) and _has_a_week(prometheus), folder)
         with urllib.request.urlopen(f"http://127.0.0.1:{metrics}/metrics", timeout=30) as answer:
             text, at_s = answer.read().decode(), time.time()
@@ -150,7 +150,7 @@ def _has_a_week(prometheus: Prometheus) -> bool:
     return any(not math.isnan(each.points[0][1]) for each in found)
 
 
-def _told(server: Any) -> int:
+def _published(server: Any) -> int:
     with server.connect() as connection:
         return connection.execute("SELECT count(*) FROM inspections WHERE outcome IS NOT NULL").fetchone()[0]
 

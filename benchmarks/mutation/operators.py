@@ -39,7 +39,7 @@ _COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
     ast.BitXor: ast.BitOr,
 }
 _NO_BEHAVIOUR = {"annotation", "returns", "decorator_list", "type_comment", "type_params"}
-_KEPT = (ast.Import, ast.ImportFrom, ast.JoinedStr)
+_NOT_CHANGED = (ast.Import, ast.ImportFrom, ast.JoinedStr)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ def _changes(holder: ast.AST, where: str) -> Iterator[_Change]:
             continue
         nodes = list(enumerate(value)) if isinstance(value, list) else [(None, value)]
         for place, node in nodes:
-            if not isinstance(node, ast.AST) or _is_docstring(node) or isinstance(node, _KEPT):
+            if not isinstance(node, ast.AST) or _is_docstring(node) or isinstance(node, _NOT_CHANGED):
                 continue
             inner = where
             if isinstance(node, (ast.FunctionDef, ast.ClassDef)):

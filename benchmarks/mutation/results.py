@@ -26,7 +26,7 @@ def load() -> dict[str, Outcome]:
     """Return the outcome of each room that was run."""
     if not FATES.exists():
         return {}
-    return {name: Outcome(**kept) for name, kept in json.loads(FATES.read_text(encoding="utf-8")).items()}
+    return {name: Outcome(**fields) for name, fields in json.loads(FATES.read_text(encoding="utf-8")).items()}
 
 
 def store(outcomes: dict[str, Outcome]) -> None:

@@ -250,7 +250,7 @@ def _put_in_place(module: CodeType, path: Path) -> bool:
     gc.unfreeze()  # the tests' own conftest freezes what was collected, which hides it from `get_objects`
     codes = {(code.co_qualname, code.co_firstlineno): code for code in _codes(module)}
     for each in gc.get_objects():
-        # By its type: `isinstance` asks the object for its class, which one of canopen's answers with an error.
+        # By its type: `isinstance` gets the object's class from it, which one of canopen's answers with an error.
         if issubclass(type(each), FunctionType) and each.__code__.co_filename == str(path):
             code = codes[each.__code__.co_qualname, each.__code__.co_firstlineno]
             if code.co_freevars == each.__code__.co_freevars:
@@ -286,7 +286,7 @@ def _import_and_meet(changed: Changed, tests: Sequence[str], order: Order) -> in
     sys.meta_path.insert(0, _Mutated(module, changed.path, changed.code()))
     try:
         importlib.import_module(module)
-    except Exception:  # noqa: BLE001 (whatever the change made of it)
+    except Exception:  # noqa: BLE001 (any error that the change causes)
         return _NO_MODULE
     # What killed others of the function, collected alone, which is quicker than all.
     killers = sorted(order.kills, key=lambda kill: -order.kills[kill])

@@ -1,4 +1,4 @@
-"""Says when the arm moves: a process of its own, as the RTDE library holds up whoever it shares a process with."""
+"""Prints when the arm moves: a process of its own, as the RTDE library holds up the rest of its process."""
 
 import sys
 import time

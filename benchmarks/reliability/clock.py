@@ -15,7 +15,7 @@ class CannotDoError(StationError):
 
 
 class ShiftedClock:
-    """The clock of whatever is started with `environment`; the file holds by how many seconds it is off.
+    """The clock of the programs that are started with `environment`; the file holds by how many seconds it is off.
 
     Args:
         folder: for the library and the file.

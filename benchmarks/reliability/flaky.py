@@ -1,4 +1,4 @@
-"""Timing-bound tests in rounds: which tests these are, and what the kept rounds say, as parts of a page."""
+"""Timing-bound tests in rounds: which tests these are, and the results of the stored rounds, as parts of a page."""
 
 import ast
 import re

@@ -38,7 +38,7 @@ _SHOWN_S = 5.0
 _STAYS_S = 1.5
 _LOOK_S = 0.02
 _OPENED_S = 0.2
-"""Jaws that were told to open before the kill have begun to."""
+"""Jaws with an order to open before the kill have started to."""
 _OPENING_S = 0.1
 _STILL_RAD, _STILL_MM = 1e-3, 0.1
 _STATES = {"held": _FRUIT, "aborted": "protective stop", "stopped": "person's stop"}

@@ -1,4 +1,4 @@
-"""The page of the kills during inspections, and the form that they are kept in."""
+"""The page of the kills during inspections, and the form in which they are stored."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -31,11 +31,11 @@ in time, and diverts the fruit.
 """
 
 
-class _Kept(BaseModel):
+class _Stored(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Kill(_Kept):
+class Kill(_Stored):
     """One process killed."""
 
     process: str
@@ -44,7 +44,7 @@ class Kill(_Kept):
     """PackML's, as the PLC read it last before the kill."""
 
 
-class Round(_Kept):
+class Round(_Stored):
     """One fruit, the kills in its time, and what came of it."""
 
     seed: int
@@ -64,7 +64,7 @@ class Round(_Kept):
     wrong: tuple[str, ...]
 
 
-class Station(_Kept):
+class Station(_Stored):
     """Contents of one station's records after all its rounds."""
 
     seed: int
@@ -74,7 +74,7 @@ class Station(_Kept):
     wrong: tuple[str, ...]
 
 
-class Made(_Kept):
+class Made(_Stored):
     """All that was ever done."""
 
     rounds: tuple[Round, ...] = ()

@@ -12,8 +12,8 @@ from station.records.model import FullRecord
 from station.records.queries import read_inspection
 from station.records.schema import inspections
 
-from .link_kept import NONE_DOUBLED, NONE_STALE, ONE_OUTCOME, WHOLE_PRESS
 from .link_observer import Observer
+from .link_results import NONE_DOUBLED, NONE_STALE, ONE_OUTCOME, WHOLE_PRESS
 from .rig import Rig
 
 Broken = tuple[str, str]

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from plc_interface.plc_simulator.program import Decision
 
-from .link_kept import LAWS, Fruit, Kept
+from .link_results import LAWS, Fruit, Results
 from .proxy import Kind
 from .routes import LinkName
 
@@ -23,7 +23,7 @@ _READY_S = {LinkName.MODBUS: 2.0, LinkName.CHANNEL: 2.0, LinkName.CAMERA: 5.0}
 _DECISIONS = tuple(str(decision) for decision in Decision)
 
 
-def sections_of(made: Kept, chart: Path) -> dict[str, list[str]]:
+def sections_of(made: Results, chart: Path) -> dict[str, list[str]]:
     """Return the page's measured sections, and draw its chart.
 
     Args:
@@ -43,7 +43,7 @@ def sections_of(made: Kept, chart: Path) -> dict[str, list[str]]:
     }
 
 
-def _played(made: Kept, disturbed: Sequence[Fruit]) -> list[str]:
+def _played(made: Results, disturbed: Sequence[Fruit]) -> list[str]:
     fruits = made.fruits
     triggers, minutes = sum(story.triggers for story in made.stories), sum(fruit.took_s for fruit in fruits) / 60
     remedies = Counter(remedy for fruit in fruits for remedy in fruit.remedies)
@@ -63,7 +63,7 @@ def _played(made: Kept, disturbed: Sequence[Fruit]) -> list[str]:
     ]
 
 
-def _laws(made: Kept) -> list[str]:
+def _laws(made: Results) -> list[str]:
     broken = [(story.seed, *each) for story in made.stories for each in story.all_broken]
     by_law = Counter(law for law, _ in {(law, seed) for seed, _, law, _ in broken})
     return [

@@ -12,9 +12,9 @@ from station.inspection.alarm_table import AlarmId
 from station.inspection.alarms import CHATTER_S
 from station.records.model import FullRecord
 
-from .link_kept import ALARMS_RETURN, NONE_DOUBLED, NOTHING_MOVES, ONE_OUTCOME, Fruit, Story
 from .link_laws import Broken, of_passage, of_records, records_since
 from .link_observer import HELD, STATISTICS, Observer
+from .link_results import ALARMS_RETURN, NONE_DOUBLED, NOTHING_MOVES, ONE_OUTCOME, Fruit, Story
 from .link_story import Moment, Plan, Planned
 from .proxy import Disturbance, Kind
 from .rig import Rig
@@ -26,7 +26,7 @@ _LOOK_S = 0.01
 _RECORDED_S = 10.0
 """Within this time after ready every outcome is acknowledged in the records."""
 _NORMAL_S = CHATTER_S + 10.0
-"""Within this time after the last fruit no alarm is active: one that chatters stays until it was quiet for so long."""
+"""Within this time after the last fruit no alarm is active: one that chatters stays until it was off for so long."""
 _PERSON_AFTER_S = 1.0
 """A person comes after so long in a state that waits for one."""
 _STILL_RAD, _STILL_MM = 1e-3, 0.1
@@ -52,7 +52,7 @@ class _Before(NamedTuple):
 
 
 class _Disturbing:
-    """The disturbance of one fruit, which may not have begun, and does not outlast the block."""
+    """The disturbance of one fruit, which may not have started, and does not outlast the block."""
 
     def __init__(self, routes: Routes, planned: Planned | None) -> None:
         self._routes, self._planned = routes, planned

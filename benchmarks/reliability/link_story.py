@@ -21,7 +21,7 @@ _LINKS = {
     LinkName.MODBUS: 5,
     LinkName.CHANNEL: 5,
 }
-"""How often each is disturbed. The script's and the dashboard's ports are quiet but for a start of the arm's driver."""
+"""How often each is disturbed. The script's and the dashboard's ports are idle but for a start of the arm's driver."""
 _LASTS_S = {
     Kind.DELAY: (0.3, 2.5),
     Kind.STALL: (0.1, 4.0),

@@ -1,4 +1,4 @@
-"""One scenario in one phase of the cycle: what was done, what the wire and the records say, what did not hold."""
+"""One scenario in one phase of the cycle: what was done, what the wire and the records have, what did not hold."""
 
 import asyncio
 import time
@@ -35,14 +35,14 @@ class Row(BaseModel):
     reasons: tuple[str, ...] = ()
     alarms: tuple[str, ...] = ()
     why: str = ""
-    """The station's last sentence on why it was not ready, apart from those that ask for a moment."""
+    """The station's last sentence on why it was not ready, apart from those that require a short wait."""
     recovered_s: float | None = None
     """From the fault's end, or from a person's last verb, to ready again."""
     wrong: tuple[str, ...] = ()
     """What did not hold."""
     skipped: str = ""
     played_on: str = ""
-    """The day, UTC, YYYY-MM-DD; empty in rows that were played before it was kept."""
+    """The day, UTC, YYYY-MM-DD; empty in rows that were played before it was stored."""
 
 
 async def play(rig: Rig, scenario: Scenario, phase: Phase) -> Row:
@@ -57,7 +57,7 @@ async def play(rig: Rig, scenario: Scenario, phase: Phase) -> Row:
     row, wrong = Row(scenario=scenario.name, phase=phase.value, played_on=today), list[str]()
     wire = rig.wire
     accepted_before, passages_before = len(wire.accepted), len(wire.passages)
-    asking = asyncio.create_task(_ask_why(rig, row), name="asking why")
+    polling = asyncio.create_task(_poll_why(rig, row), name="polling why")
     try:
         await _sure(lambda: wire.ready, lambda: f"not ready before the fault ({wire.standing})")
         wire.forget_alarms()
@@ -88,8 +88,8 @@ async def play(rig: Rig, scenario: Scenario, phase: Phase) -> Row:
     finally:
         await rig.unwatch_arm()
         await rig.hurry()
-        asking.cancel()
-        await asyncio.gather(asking, return_exceptions=True)
+        polling.cancel()
+        await asyncio.gather(polling, return_exceptions=True)
         if scenario.fault is not None:
             await rig.end(scenario.fault)
     row.alarms = tuple(sorted(wire.alarms))
@@ -180,10 +180,12 @@ def disagreements(rig: Rig, accepted_before: int) -> list[str]:
         wrong.append(f"{wire.doubled} results came again after their acknowledgement")
     accepted = wire.accepted[accepted_before:]
     for trigger_id in accepted:
-        told = {number: shown for number, shown in wire.shown.items() if any(s.trigger_id == trigger_id for s in shown)}
-        if len(told) != 1:
-            wrong.append(f"trigger {trigger_id} has {len(told)} results: {sorted(told)}")
-        for sequence, shown in told.items():
+        results = {
+            number: shown for number, shown in wire.shown.items() if any(s.trigger_id == trigger_id for s in shown)
+        }
+        if len(results) != 1:
+            wrong.append(f"trigger {trigger_id} has {len(results)} results: {sorted(results)}")
+        for sequence, shown in results.items():
             if len(shown) != 1:
                 wrong.append(f"result {sequence} changed while it was shown")
             wrong += _unlike_record(rig, sequence, next(iter(shown)))
@@ -198,14 +200,14 @@ def _unlike_record(rig: Rig, sequence: int, shown: Shown) -> list[str]:
             record = read_inspection(connection, sequence, rig.records)
     except RecordsError as error:
         return [f"result {sequence} is not in the records: {error}"]
-    told = record.standing
-    if told is None:
+    standing = record.standing
+    if standing is None:
         return [f"result {sequence} has no outcome in the records"]
     wrong = list[str]()
-    if (told.trigger_id, told.outcome, tuple(sorted(told.reasons))) != (
+    if (standing.trigger_id, standing.outcome, tuple(sorted(standing.reasons))) != (
         shown.trigger_id, shown.outcome, shown.reasons
     ):  # fmt: skip
-        wrong.append(f"result {sequence}: the PLC read {shown.outcome}, the records say {told.outcome}")
+        wrong.append(f"result {sequence}: the PLC read {shown.outcome}, the records say {standing.outcome}")
     if record.acknowledged_utc_ms is None:
         wrong.append(f"result {sequence} is not acknowledged in the records")
     if shown.outcome == "PASS":
@@ -219,7 +221,7 @@ def _unlike_record(rig: Rig, sequence: int, shown: Shown) -> list[str]:
     return wrong
 
 
-async def _ask_why(rig: Rig, row: Row) -> None:
+async def _poll_why(rig: Rig, row: Row) -> None:
     while True:
         why = await rig.why_not_ready()
         if why and not any(words in why for words in _PASSING):
@@ -233,10 +235,10 @@ async def _sure(holds: Callable[[], bool], otherwise: Callable[[], str]) -> None
 
 
 def _now(holds: Callable[[], bool]) -> Callable[[], Awaitable[bool]]:
-    async def asked() -> bool:
+    async def evaluate() -> bool:
         return holds()
 
-    return asked
+    return evaluate
 
 
 async def _until(holds: Callable[[], Awaitable[bool]], limit_s: float = _PATIENCE_S) -> bool:

@@ -7,7 +7,7 @@ from station.settings.recipe_model import Recipe
 
 JUDGED: Mapping[str, Any] = {
     "damage.growth_mm2_per_mm": 60,
-    # The unit is not calibrated and no grader tells a size: by a usual coverage no fruit would pass.
+    # The unit is not calibrated and no grader gives a size: by a usual coverage no fruit would pass.
     "damage.size": None,
     "damage.uncertainty": {"coverage": 0.6, "repeatability": [{"closing_mm": 3.0, "relative": 0.03}]},
     "early_stop.area_mm2": 150,

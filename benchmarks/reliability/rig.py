@@ -92,7 +92,7 @@ class Rig:
         self._moving: asyncio.Task[bytes] | None = None
 
     async def twin(self, **request: Any) -> Any:
-        """Ask the twin's console."""
+        """Send a request to the twin's console."""
         return await asyncio.to_thread(ask, LOOPBACK, self._console, request)
 
     async def lay_and_trigger(self, *, bruised: bool = False) -> None:

@@ -17,7 +17,7 @@ class LinkName(StrEnum):
 
     RTDE = "RTDE"
     SCRIPT = "script and dashboard"
-    """The arm's other ports: scripts are sent there, and the dashboard is asked."""
+    """The arm's other ports: scripts are sent there, and the dashboard is queried."""
     URCAP = "URCap"
     CAMERA = "camera"
     MODBUS = "Modbus"

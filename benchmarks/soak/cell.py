@@ -17,7 +17,7 @@ from typing import NamedTuple
 from archive.many import fill
 from archive.postgres import PORT, Server, programs, throwaway
 from bench_plc import HOST, wait_for
-from looking.rounds import clients
+from hmi_load.rounds import clients
 from monitoring.ports import free_port
 
 from plc_interface.plc_simulator.nest import LaidFruit, TwinNest
@@ -194,10 +194,10 @@ async def running() -> AsyncIterator[Cell]:
         console_port = free_port()
         await stack.enter_async_context(supervised(file, site, console_port))
         for who, count in (("panels", PANELS), ("readers", READERS)):
-            looking = clients(who, count, site.hmi.host, site.hmi.port)
+            load = clients(who, count, site.hmi.host, site.hmi.port)
             # Not on this loop, which feeds the supervisor, until the first of them is answered.
-            await asyncio.to_thread(looking.__enter__)
-            stack.push(looking.__exit__)
+            await asyncio.to_thread(load.__enter__)
+            stack.push(load.__exit__)
         line, task = await stack.enter_async_context(feeding(site, console_port))
         yield Cell(site, server, bare_port, line, task)
 

@@ -159,7 +159,7 @@ class Timing(NamedTuple):
 def rounds_of_kinds(samples: Sequence[Sample]) -> list[list[Sample]]:
     """Return runs of samples in which all kinds came by: each begins with the last one of the run before.
 
-    A kind has its own time, so that a shorter while says more of the kind than of the station. A restart of the service
+    A kind has its own time, so that a shorter time shows more of the kind than of the station. A restart of the service
     sets its counts back, and begins anew.
     """
     runs, run = list[list[Sample]](), list(samples[:1])

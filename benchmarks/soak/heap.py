@@ -42,7 +42,7 @@ def in_use_bytes(pid: int) -> int:
 def _used(pid: int, begins: int, ends: int) -> int | None:
     """Return the bytes in use on the heap between two addresses; None where the walk failed.
 
-    The heap is a row of chunks: at byte 8 of each is its size, of which bit 0 says that the chunk before is in use; the
+    The heap is a row of chunks: at byte 8 of each is its size, of which bit 0 is set if the chunk before is in use; the
     last, free, reaches to the heap's end (malloc_chunk in glibc's malloc/malloc.c). What waits in a thread's cache
     counts as used.
     """

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import psutil
-from looking.rounds import OWN_PHASES
+from hmi_load.rounds import OWN_PHASES
 from prometheus_client.parser import text_string_to_metric_families
 
 from .heap import in_use_bytes
@@ -68,7 +68,7 @@ class Sample(NamedTuple):
     processes: dict[str, ProcessSample]
     latency: Latency
     bare: Latency
-    """Of the same server with no station behind it, asked by a client of the same kind in the same window."""
+    """Of the same server with no station behind it, read by a client of the same kind in the same window."""
     work_ms: float
     """Mean time of a fixed piece of work in that window."""
     counts: StationCounts

@@ -40,7 +40,7 @@ def slope(at_s: Sequence[float], values: Sequence[float]) -> Slope | None:
     Sen's interval (1968) takes the points as independent. Memory is not: it rises by steps and remains there, so the
     variance of Kendall's statistic is multiplied as by Hamed and Rao (Journal of Hydrology 204, 1998), by the
     autocorrelation of the detrended values' ranks. Only its lags before the first insignificant one count (Geyer 1992):
-    the sum over all lags of a series is -1/2, whatever the series.
+    the sum over all lags of a series is -1/2, for any series.
 
     Args:
         at_s: times.

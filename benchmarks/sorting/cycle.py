@@ -1,6 +1,6 @@
 """The station's decision on one fruit, closing by closing: centre, press step by step, judge, press twice.
 
-The functions say what the service's cycle does with measured steps; here the steps come from a cache.
+The functions define what the service's cycle does with measured steps; here the steps come from a cache.
 """
 
 from collections.abc import Callable, Sequence
@@ -174,7 +174,7 @@ def as_stopped(
     for step in pressed.steps:
         press = replace(press, points=(*press.points, _measured(step, mm_per_px)))
         ends = ends_steps(together([*earlier, press]), recipe)
-        # The fingers run on for about a frame: the next one is where they come to rest, and has to say so too.
+        # The fingers run on for about a frame: the next one is where they come to rest, and has to show it too.
         if ends and (ended_on_the_way or not step.on_the_way):
             break
         ended_on_the_way = ends

@@ -30,7 +30,7 @@ def wilson(count: int, of: int) -> tuple[float, float]:
 
     Args:
         count: how many have it.
-        of: how many were looked at, at least 1.
+        of: how many were checked, at least 1.
     """
     squared = _95_PERCENT**2
     share = count / of
@@ -64,7 +64,7 @@ def share_of(count: int, of: int) -> str:
 
     Args:
         count: how many have it.
-        of: how many were looked at, at least 1.
+        of: how many were checked, at least 1.
     """
     low, high = wilson(count, of)
     return f"{count} of {of}, {100 * count / of:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
@@ -111,8 +111,8 @@ def diverted_why(inspected: Iterable[Inspected]) -> list[str]:
     for kind in KINDS:
         wrong = [one for one in groups.get((kind, SOUND), []) if is_error(one)]
         reasons = Counter(reason.value for one in wrong for reason in one.reasons)
-        told = ", ".join(f"{reason} {count}" for reason, count in reasons.most_common()) or "none"
-        lines.append(row(kind, len(wrong), told))
+        listed = ", ".join(f"{reason} {count}" for reason, count in reasons.most_common()) or "none"
+        lines.append(row(kind, len(wrong), listed))
     return lines
 
 

@@ -19,7 +19,7 @@ LIMITS: Deadlines = deadlines(RECIPE, Pace(30.0, 1.0, 2.0, 100.0, 85.0, 0.5, 0.1
 
 
 class NoMetrics:
-    """Metrics that nobody reads."""
+    """Metrics that are not read."""
 
     def alarms(self, active: Any) -> None:
         """Take the active alarms."""

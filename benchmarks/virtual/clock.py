@@ -37,7 +37,7 @@ class Clock:
         return self.s + self.utc_offset_s
 
     def after(self, delay_s: float, what: Callable[[], None]) -> Timer:
-        """Let something happen; of the same moment what was asked for first comes first."""
+        """Let something happen; of the same moment what was requested first comes first."""
         timer = Timer(what)
         self._number += 1
         heapq.heappush(self._heap, (self.s + delay_s, self._number, timer))

@@ -19,7 +19,7 @@ class Inspections:
         self._clock, self._records = cell.clock, cell.records
         self._pending: Pending | None = None
         self._now: Inspection | None = None
-        self._begun: list[Inspection] = []
+        self._accepted: list[Inspection] = []
         self._waiting: dict[int, list[Callable[[Outcome], None]]] = {}
 
     @property
@@ -30,7 +30,7 @@ class Inspections:
 
     @property
     def _running(self) -> Inspection | None:
-        return next((now for now in self._begun if not now.standing), None)
+        return next((now for now in self._accepted if not now.standing), None)
 
     def _interrupt(self, reason: Reason) -> None:
         now = self._inspection
@@ -61,8 +61,8 @@ class Inspections:
 
     def _take_on(self, pending: Pending) -> None:
         pending.now.accepted_s = self._clock.s
-        self._begun = [now for now in self._begun if not now.standing]
-        self._begun.append(pending.now)
+        self._accepted = [now for now in self._accepted if not now.standing]
+        self._accepted.append(pending.now)
         deadline_s = LIMITS.inspection_s + RECORD_NO_RESULT_S
         pending.answer(BeginReply(sequence=pending.now.sequence, deadline_s=deadline_s))
 

@@ -151,13 +151,13 @@ class Interface:
         match action:
             case do.RequestBegin(number=number):
 
-                def begun(reply: BeginReply) -> None:
+                def begin_answered(reply: BeginReply) -> None:
                     self.feed(ev.BeginAnswered(self._at(), number, reply))
 
                 self._request(
                     lambda answer: station().begin(action.trigger_id, action.encoder, action.lot, answer),
                     SETTINGS.begin_deadline_s,
-                    begun,
+                    begin_answered,
                     lambda: self.feed(ev.BeginFailed(self._at(), number)),
                 )
             case do.RequestOutcome(sequence=sequence, within_s=within_s):
@@ -213,7 +213,7 @@ class Interface:
 
     def _request(
         self,
-        ask: Callable[[Callable[[Any], None]], Any],
+        submit: Callable[[Callable[[Any], None]], Any],
         within_s: float,
         answered: Callable[[Any], None],
         failed: Callable[[], None],
@@ -233,7 +233,7 @@ class Interface:
 
         def arrived() -> None:
             if self._machine.station.alive and self._clock.s < deadline_s:  # the channel's server drops a later one
-                ask(answer)
+                submit(answer)
 
         if (delay_s := self._way_s()) is not None:
             self._clock.after(delay_s, arrived)

@@ -182,7 +182,7 @@ class Interpreter(Inspections):
         return may_decide(RECIPE, now.captured[-1].closing_mm) and now.seen < len(now.captured)
 
     def _request(self, action: Action) -> None:
-        """Ask the part that an action needs."""
+        """Send a request to the part that an action needs."""
         if action in _ARM_LEAVES and not self.cell.jaws_open:
             raise LawBrokenError(NOTHING_MOVES, f"{action} with jaws that may hold a fruit")
         part, takes_s = _WORK[action]
@@ -256,8 +256,8 @@ class Interpreter(Inspections):
         else:
             self._after(_POLL_S, self._poll)
 
-    def _check(self, asked_in: State) -> None:
-        if self.state is not asked_in:
+    def _check(self, requested_in: State) -> None:
+        if self.state is not requested_in:
             return
         for part in ("arm", "gripper", "camera"):
             if (fault := self.cell.devices.standing(part)) is not None:

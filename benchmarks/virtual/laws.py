@@ -47,7 +47,7 @@ class Laws:
         self._accepted: set[int] = set()
 
     def accepted(self, sequence: int) -> None:
-        """The PLC was told that a trigger is accepted."""
+        """The PLC received that a trigger is accepted."""
         self._accepted.add(sequence)
 
     def seen(self, registers: Mapping[str, Any]) -> None:
@@ -79,7 +79,7 @@ class Laws:
             self._whole(passage.sequence, record.press)
 
     def _whole(self, sequence: int, press: Press | None) -> None:
-        """A PASS's press by a plain rule of its own, apart from the judge: a trusted area at the last limit, kept."""
+        """A PASS's press by a plain rule of its own, apart from the judge: a trusted area within the last limit."""
         if press is None or press.interruptions or press.onset_mm is None:
             raise LawBrokenError(WHOLE_PRESS, f"sequence {sequence} was interrupted, or met nothing")
         last = self._recipe.damage.area[-1]
@@ -98,7 +98,7 @@ class Laws:
 
     @staticmethod
     def cycle(before: State, event: Event, after: State, moving: Collection[str]) -> None:
-        """The cycle took an event, and its actions have begun."""
+        """The cycle took an event, and its actions have started."""
         if after in HELD and moving:
             raise LawBrokenError(NOTHING_MOVES, f"{', '.join(moving)} in {after}")
         ends = before in _FOR_A_PERSON and after not in _FOR_A_PERSON

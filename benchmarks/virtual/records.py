@@ -1,4 +1,4 @@
-"""Records as a value in memory, with the rules of the station's: the first published outcome stands."""
+"""Records as a value in memory, with the rules of the station's: the first published outcome remains."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -61,7 +61,7 @@ class MemoryRecords(dict[int, Record]):
         return sequence
 
     def conclude(self, sequence: int, outcome: Outcome) -> Outcome:
-        """Store an outcome, unless one stands; return the one that does."""
+        """Store an outcome, unless there is one; return the one in force."""
         record = self[sequence]
         record.judged = record.judged or outcome.outcome
         record.standing = record.standing or outcome

@@ -1,6 +1,6 @@
 """Station on the simulated clock: the real cycle's table, deadlines, judge, stop criteria and alarm manager.
 
-A plain interpreter of the cycle's actions stands in for the runner and the service, which wait by asyncio.
+A plain interpreter of the cycle's actions replaces the runner and the service, which wait by asyncio.
 """
 
 from collections.abc import Callable
@@ -72,7 +72,7 @@ class Station(Actions):
         record = self._records.get(sequence)
         if record is None:
             return False
-        known = any(now.sequence == sequence and not now.standing for now in self._begun)
+        known = any(now.sequence == sequence and not now.standing for now in self._accepted)
         if record.standing is not None and not known:
             answer(record.standing)
         else:

@@ -9,7 +9,7 @@ from plc_interface.plc_simulator.faults import LineFault
 DEVICE_KINDS = ("off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent")
 ARM_STOPS = ("protective_stop", "emergency_stop", "safety_fault")
 KINDS: dict[str, tuple[str, ...]] = {
-    "arm": (*DEVICE_KINDS[:3], *DEVICE_KINDS[4:], *ARM_STOPS),  # where the arm is, no measured value says
+    "arm": (*DEVICE_KINDS[:3], *DEVICE_KINDS[4:], *ARM_STOPS),  # no measured value shows where the arm is
     "gripper": DEVICE_KINDS,
     "camera": DEVICE_KINDS,
     "vision": ("off", "stuck", "slow", "delayed", "intermittent"),
@@ -86,8 +86,8 @@ def shrink(story: Story, fails: Callable[[Story], bool]) -> Story:
     size = max(1, len(story.troubles) // 2)
     while story.troubles:
         starts = range(0, len(story.troubles), size)
-        kept = [story.troubles[:start] + story.troubles[start + size :] for start in starts]
-        less = next((each for troubles in kept if fails(each := replace(story, troubles=troubles))), None)
+        remaining = [story.troubles[:start] + story.troubles[start + size :] for start in starts]
+        less = next((each for troubles in remaining if fails(each := replace(story, troubles=troubles))), None)
         if less is not None:
             story = less
         elif size == 1:

@@ -242,7 +242,7 @@ def test_one_bad_image_costs_exit_code_2_and_no_other_result(
 
 
 def test_a_playlist_in_place_of_a_video_asks_nobody(press, analyze, tmp_path):
-    """So the bill of materials says of the TLS library that OpenCV brings for FFmpeg's network protocols."""
+    """As the bill of materials states of the TLS library that OpenCV brings for FFmpeg's network protocols."""
     video = press.folder / "bad.mp4"
     with socket.create_server(("127.0.0.1", 0)) as server:
         server.setblocking(False)
@@ -312,7 +312,7 @@ def test_an_output_that_cannot_be_made_is_refused(press, analyze, tmp_path):
 
 
 def test_a_disk_that_fills_up_keeps_what_was_measured(press, analyze_apart, tmp_path):
-    """The limit on a file's size stands for the full disk: the last, noisy stage does not fit any more."""
+    """The limit on a file's size simulates a full disk: the last, noisy stage does not fit any more."""
     out = tmp_path / "out"
     noise = np.random.default_rng(0).integers(0, 255, (320, 240, 3), dtype=np.uint8)
     cv2.imwrite(str(press.folder / "frame_13.png"), noise)

@@ -37,13 +37,13 @@ def drawn_ball() -> Callable[..., Any]:
     return SimulatedRig
 
 
-def calibrate_drawn(ball: Any, *places: tuple[float, float], told: list[Progress] | None = None) -> Draft:
+def calibrate_drawn(ball: Any, *places: tuple[float, float], progress: list[Progress] | None = None) -> Draft:
     """Run a calibration."""
     recipe = find_recipe("rubber_ball")
-    tell = [].append if told is None else told.append
+    report = [].append if progress is None else progress.append
     return asyncio.run(
         CalibrationProcedure(
-            ball, UNIT, recipe, CalibrationSettings(), [Place(*place) for place in places], "anna", "0.1", tell
+            ball, UNIT, recipe, CalibrationSettings(), [Place(*place) for place in places], "anna", "0.1", report
         ).run()
     )
 
@@ -81,7 +81,7 @@ class Site:
     serial: str
     console: int
 
-    def ask(self, **request: Any) -> Any:
+    def twin(self, **request: Any) -> Any:
         return ask("127.0.0.1", self.console, request)
 
     def command(self, *arguments: object) -> list[str]:

@@ -50,13 +50,13 @@ def test_onset_zero_noise_light_and_curve_are_found(draft):
 
 
 def test_one_place_gives_the_usual_scale_and_says_so(drawn_ball, calibrate_drawn):
-    told = []
+    reported = []
     ball = drawn_ball(2)
-    calibration = calibrate_drawn(ball, told=told).calibration
+    calibration = calibrate_drawn(ball, progress=reported).calibration
     assert (calibration.mm_per_px, calibration.scale_measured) == (0.0266, False)
     assert calibration.scale_uncertainty == 0.15
     assert ball.released == 1
-    steps = [progress for progress in told if progress.of == 14]
+    steps = [progress for progress in reported if progress.of == 14]
     assert [progress.number for progress in steps] == list(range(1, 15))
 
 
@@ -144,12 +144,12 @@ def test_called_off_in_the_middle_the_jaws_open(drawn_ball):
     async def scenario():
         ball, pressing = drawn_ball(1), asyncio.Event()
 
-        def told(progress):
+        def report(progress):
             if progress.number == 3:
                 pressing.set()
 
         recipe = find_recipe("rubber_ball")
-        procedure = CalibrationProcedure(ball, UNIT, recipe, CalibrationSettings(), [], "anna", "0.1", told)
+        procedure = CalibrationProcedure(ball, UNIT, recipe, CalibrationSettings(), [], "anna", "0.1", report)
         running = asyncio.create_task(procedure.run())
         await pressing.wait()
         running.cancel()

@@ -22,7 +22,7 @@ def until(process, words):
     for line in process.stdout:
         if words in line:
             return line
-    pytest.fail(f"{words!r} was never told: {process.stderr.read()}")
+    pytest.fail(f"{words!r} was never printed: {process.stderr.read()}")
 
 
 @pytest.mark.timeout(900)
@@ -33,7 +33,7 @@ def test_calibrate_at_two_places_verify_and_analyze_by_it(site, tmp_path):
     process.stdin.write("\n")
     process.stdin.flush()
     until(process, "lay the ball 3 mm to the right")
-    site.ask(do="fruit", kind="rubber_ball", x_mm=3.0)
+    site.twin(do="fruit", kind="rubber_ball", x_mm=3.0)
     output, errors = process.communicate("\n", timeout=280)
     assert process.returncode == 0, errors
     store = CalibrationStore(site.home)
@@ -46,11 +46,11 @@ def test_calibrate_at_two_places_verify_and_analyze_by_it(site, tmp_path):
 
     listed = site.station("calibrate", "list")
     assert str(calibration.summary()) in listed.stdout
-    site.ask(do="fruit", kind="rubber_ball")
+    site.twin(do="fruit", kind="rubber_ball")
     good = site.station("verify", "--yes")
     assert good.returncode == 0, good.stdout + good.stderr
     assert "PASS; look at" in good.stdout
-    site.ask(do="set", device="camera", fault="gel_torn")
+    site.twin(do="set", device="camera", fault="gel_torn")
     bad = site.station("verify", "--yes")
     assert bad.returncode == 1
     assert "FAIL  tear" in bad.stdout
@@ -91,14 +91,14 @@ def test_called_off_in_the_middle_nothing_is_stored_and_the_jaws_open(site):
     assert process.returncode == 130
     assert "interrupted" in errors
     assert not (site.home / "calibrations").exists()
-    assert site.ask(do="state")["width_mm"] > 52
+    assert site.twin(do="state")["width_mm"] > 52
 
 
 def test_it_asks_first_and_an_input_that_has_ended_calls_it_off(site):
     done = subprocess.run(site.command("calibrate"), input="", capture_output=True, text=True, timeout=200, check=False)
     assert done.returncode == 130
     assert "hands are away" in done.stdout
-    assert site.ask(do="state")["width_mm"] > 52
+    assert site.twin(do="state")["width_mm"] > 52
 
 
 def test_nothing_is_verified_without_a_calibration_of_this_very_unit(site):
@@ -135,7 +135,7 @@ def test_bad_places_and_bad_names_are_bad_usage(site, station_here):
 
 @pytest.mark.timeout(900)
 def test_with_the_arm_a_dead_led_is_refused_and_shown_and_the_mended_sensor_is_calibrated_and_verified(cell):
-    cell.ask(do="set", device="camera", fault="led_dead")
+    cell.twin(do="set", device="camera", fault="led_dead")
     refused = cell.station("calibrate", "--yes", "--operator", "anna")
     assert refused.returncode == 1
     assert "LED is dead" in refused.stderr
@@ -146,10 +146,10 @@ def test_with_the_arm_a_dead_led_is_refused_and_shown_and_the_mended_sensor_is_c
     assert "nothing is calibrated yet" in cell.station("calibrate", "list").stdout
     assert "Traceback" not in refused.stderr
 
-    cell.ask(do="clear", device="camera")
+    cell.twin(do="clear", device="camera")
     calibrated = cell.station("calibrate", "--yes")
     assert calibrated.returncode == 0, calibrated.stdout + calibrated.stderr
     verified = cell.station("verify", "--yes")
     assert verified.returncode == 0, verified.stdout + verified.stderr
     assert "PASS; look at" in verified.stdout
-    assert cell.ask(do="state")["width_mm"] > 52
+    assert cell.twin(do="state")["width_mm"] > 52

@@ -1,4 +1,4 @@
-"""The station measures by its sensor's calibration, says so, and demands a verification where it is told to."""
+"""The station measures by its sensor's calibration, reports so, and demands a verification where that is configured."""
 
 import asyncio
 import contextlib
@@ -153,7 +153,7 @@ def test_a_fruit_is_measured_by_the_calibration_and_its_record_names_it(site, dr
     [metrics_port] = unused_ports(1)
     with site.configuration.open("a") as file:
         file.write(f"calibration: {{verify_every_h: 8}}\nmetrics: {{port: {metrics_port}}}\n")
-    site.ask(do="remove")
+    site.twin(do="remove")
     store = CalibrationStore(site.home)
     calibration = draft.calibration.model_copy(update={"serial": site.serial, "id": stamp(datetime.now(UTC))})
     store.add_calibration(calibration, {})
@@ -178,9 +178,9 @@ def test_a_fruit_is_measured_by_the_calibration_and_its_record_names_it(site, dr
 
 
 async def inspected(site, store, calibration):
-    """One fruit's outcome, with the verification made only once it is asked for."""
+    """One fruit's outcome, with the verification made only once it is requested."""
     configuration = load_configuration(site.configuration)
-    asked = reset = False
+    verified = reset = False
     async with ChannelClient(line_endpoint(configuration.handshake, configuration.home), "the station") as client:
         deadline_s = time.monotonic() + 300
         while not (state := await beat(client)).ready:
@@ -190,7 +190,7 @@ async def inspected(site, store, calibration):
                 command = Command(command=CommandName.CHANGE_RECIPE, argument=1)
                 await client.request(command, CommandDone, deadline_s=40)
             elif why is not None and why.id == messages.NEVER_VERIFIED.id:
-                asked = True
+                verified = True
                 assert "never verified" in str((await glance(configuration)).check_due)
                 store.add_verification(verification(calibration, datetime.now(UTC)), {})
             elif state.boot and not reset:
@@ -198,11 +198,11 @@ async def inspected(site, store, calibration):
                     await client.request(Command(command=CommandName.RESET, argument=0), CommandDone, deadline_s=40)
                 ).done
             await asyncio.sleep(0.1)
-        assert asked
-        site.ask(do="fruit", kind="strawberry", seed=2)
-        begun = await client.request(Begin(trigger_id=1, encoder=0, lot="A"), BeginReply, deadline_s=40)
-        assert begun.sequence is not None, begun
-        return await client.request(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=100)
+        assert verified
+        site.twin(do="fruit", kind="strawberry", seed=2)
+        reply = await client.request(Begin(trigger_id=1, encoder=0, lot="A"), BeginReply, deadline_s=40)
+        assert reply.sequence is not None, reply
+        return await client.request(AwaitOutcome(sequence=reply.sequence), Outcome, deadline_s=100)
 
 
 async def glance(configuration):

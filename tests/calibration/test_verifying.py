@@ -17,10 +17,10 @@ from station.twin.digit.sensor import Condition
 from station.vision.median import median_image
 
 
-def verified(ball, draft, tell=lambda _progress: None):
+def verified(ball, draft, report=lambda _progress: None):
     recipe, settings = find_recipe("rubber_ball"), CalibrationSettings()
     pictures = draft.reference, [step.image for step in draft.steps]
-    procedure = VerificationProcedure(ball, recipe, settings, draft.calibration, *pictures, "anna", tell)
+    procedure = VerificationProcedure(ball, recipe, settings, draft.calibration, *pictures, "anna", report)
     return asyncio.run(procedure.run())
 
 

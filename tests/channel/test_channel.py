@@ -49,11 +49,11 @@ class Peer:
     """A server with some handlers, and what it carried out."""
 
     def __init__(self) -> None:
-        self.begun = []
+        self.started = []
         self.sleeping = asyncio.Event()
 
     async def add(self, request: Add) -> Sum:
-        self.begun.append(request)
+        self.started.append(request)
         return Sum(total=request.a + request.b)
 
     async def sleep(self, request: Sleep) -> Sum:
@@ -97,11 +97,11 @@ def test_each_of_many_requests_gets_its_own_answer(tmp_path):
 def test_a_slow_answer_is_given_up_and_does_not_hold_up_others(tmp_path):
     async def body(client, peer, endpoint):
         slow = asyncio.create_task(client.request(Sleep(duration_s=30.0), Sum, deadline_s=0.3))
-        begun = time.monotonic()
+        began_s = time.monotonic()
         assert (await client.request(Add(a=1, b=2), Sum, deadline_s=5.0)).total == 3
         with pytest.raises(DeadlineError, match=r"the peer did not answer Sleep within 0\.3 s"):
             await slow
-        assert time.monotonic() - begun < 10.0
+        assert time.monotonic() - began_s < 10.0
         assert (await client.request(Add(a=2, b=2), Sum, deadline_s=5.0)).total == 4
 
     with_peer(tmp_path, body)
@@ -115,7 +115,7 @@ def test_a_request_that_nobody_took_in_time_is_not_begun_later(tmp_path):
                 await client.request(Add(a=1, b=1), Sum, deadline_s=0.1)
             serving = asyncio.create_task(peer.serve(endpoint))
             assert (await client.request(Add(a=2, b=2), Sum, deadline_s=5.0)).total == 4
-            assert [request.a for request in peer.begun] == [2]
+            assert [request.a for request in peer.started] == [2]
             serving.cancel()
             await asyncio.gather(serving, return_exceptions=True)
 
@@ -165,7 +165,7 @@ def test_rubbish_does_not_end_the_server(tmp_path):
         ):
             await raw.send_multipart(frames)
         assert (await client.request(Add(a=1, b=2), Sum, deadline_s=5.0)).total == 3
-        assert all(request == Add(a=1, b=2) for request in peer.begun)
+        assert all(request == Add(a=1, b=2) for request in peer.started)
         raw.close(linger=0)
         context.term()
 
@@ -174,11 +174,11 @@ def test_rubbish_does_not_end_the_server(tmp_path):
 
 def test_closing_ends_what_is_under_way(tmp_path):
     async def body(client, peer, endpoint):
-        asking = asyncio.create_task(client.request(Sleep(duration_s=30.0), Sum, deadline_s=60.0))
+        request = asyncio.create_task(client.request(Sleep(duration_s=30.0), Sum, deadline_s=60.0))
         await asyncio.wait_for(peer.sleeping.wait(), 5)
         await client.close()
         with pytest.raises(ChannelError, match="was closed"):
-            await asking
+            await request
         await client.close()
         with pytest.raises(ChannelError, match="was closed"):
             await client.request(Sleep(duration_s=0.0), Sum, deadline_s=1.0)

@@ -24,7 +24,7 @@ class Cell:
     console: int
     process: subprocess.Popen[str]
 
-    def ask(self, **request: Any) -> Any:
+    def twin(self, **request: Any) -> Any:
         return ask("127.0.0.1", self.console, request)
 
     def station(self, *arguments: object, timeout_s: float = 90) -> subprocess.CompletedProcess[str]:
@@ -37,7 +37,7 @@ class Cell:
 
 
 @contextlib.contextmanager
-def begun_cells(folder: Path) -> Iterator[Callable[..., Cell]]:
+def started_cells(folder: Path) -> Iterator[Callable[..., Cell]]:
     """Starts a twin with the arguments given; all are ended at the end.
 
     The station's patience is that of a machine that runs other tests too.
@@ -75,12 +75,12 @@ def begun_cells(folder: Path) -> Iterator[Callable[..., Cell]]:
 @pytest.fixture
 def make_cell(tmp_path: Path) -> Iterator[Callable[..., Cell]]:
     """Start a twin with the arguments given; it is ended after the test."""
-    with begun_cells(tmp_path) as make:
+    with started_cells(tmp_path) as make:
         yield make
 
 
 @pytest.fixture(scope="module")
 def shared_cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
     """A twin for all tests of a module: each leaves it as it was."""
-    with begun_cells(tmp_path_factory.mktemp("cell")) as make:
+    with started_cells(tmp_path_factory.mktemp("cell")) as make:
         yield make()

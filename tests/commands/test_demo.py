@@ -43,8 +43,8 @@ def demo(tmp_path, unused_ports):
     return begin
 
 
-def records_of(home, *ask):
-    command = [sys.executable, "-m", "station", "records", *(ask or ("list", "--last", "100"))]
+def records_of(home, *arguments):
+    command = [sys.executable, "-m", "station", "records", *(arguments or ("list", "--last", "100"))]
     environment = {**os.environ, "STATION_HOME": str(home)}
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=True, env=environment).stdout
 

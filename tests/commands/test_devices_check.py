@@ -25,7 +25,7 @@ def verdicts(output: str) -> dict[str, str]:
 def test_a_sound_cell_names_every_device_with_what_it_is(shared_cell):
     done = shared_cell.station("devices", "check")
     assert done.returncode == 0, done.stderr
-    # On a busy machine the twin draws fewer frames than the camera should give, and that is said.
+    # On a busy machine the twin draws fewer frames than the camera should give, and that is reported.
     found = re.search(r"480x640, ([\d.]+) frames/s", done.stdout)
     assert found
     slow = str(camera_messages.REMEDY_SLOW(rate=30.0)) in done.stdout
@@ -53,9 +53,9 @@ def test_a_sound_cell_names_every_device_with_what_it_is(shared_cell):
 )
 def test_a_fault_is_told_with_its_remedy_and_exit_code_1(make_cell, shared_cell, device, fault, name):
     cell = make_cell() if device == "arm" else shared_cell  # an arm needs a person to bring it back
-    cell.ask(do="set", device=device, fault=fault)
+    cell.twin(do="set", device=device, fault=fault)
     done = cell.station("devices", "check")
-    cell.ask(do="clear", device=device, fault=fault)
+    cell.twin(do="clear", device=device, fault=fault)
     assert done.returncode == 1
     assert name in done.stderr.removeprefix("station: not usable: ").strip().split(", ")
     assert "Traceback" not in done.stderr
@@ -67,15 +67,15 @@ def test_a_fault_is_told_with_its_remedy_and_exit_code_1(make_cell, shared_cell,
 
 def test_without_a_twin_nothing_is_usable_and_nothing_hangs(make_cell):
     cell = make_cell("--bench")
-    cell.ask(do="set", device="gripper", fault="off")
-    cell.ask(do="set", device="camera", fault="off")
+    cell.twin(do="set", device="gripper", fault="off")
+    cell.twin(do="set", device="camera", fault="off")
     done = cell.station("devices", "check")
     assert done.returncode == 1
     assert "not usable: arm, camera, gripper" in done.stderr
 
 
 @pytest.mark.parametrize(
-    ("arm", "gripper", "said"),
+    ("arm", "gripper", "expected"),
     [
         (
             "no-such-robot.invalid",
@@ -89,28 +89,28 @@ def test_without_a_twin_nothing_is_usable_and_nothing_hangs(make_cell):
             ),
         ),
         (
-            "{nobody}",
-            "{urcap: {host: {nobody}}}",
+            "{absent}",
+            "{urcap: {host: {absent}}}",
             (
-                arm_messages.DASHBOARD_ABSENT(address="{nobody}:29999"),
+                arm_messages.DASHBOARD_ABSENT(address="{absent}:29999"),
                 gripper_messages.UNREACHABLE_BECAUSE(
-                    place=gripper_messages.PLACE_URCAP(address="{nobody}:63352"), reason=verbatim("Connection refused")
+                    place=gripper_messages.PLACE_URCAP(address="{absent}:63352"), reason=verbatim("Connection refused")
                 ),
                 gripper_messages.REMEDY_URCAP(),
             ),
         ),
     ],
 )
-def test_a_sites_wrong_addresses_are_named_with_what_to_correct(tmp_path, arm, gripper, said):
-    nobody = fresh_host()
+def test_a_sites_wrong_addresses_are_named_with_what_to_correct(tmp_path, arm, gripper, expected):
+    absent = fresh_host()
     file = tmp_path / "station.yaml"
     file.write_text(
-        f"arm: {{host: {arm}}}\ngripper: {gripper}\n".replace("{nobody}", nobody)
+        f"arm: {{host: {arm}}}\ngripper: {gripper}\n".replace("{absent}", absent)
         + "camera: {driver: digit, open_deadline_s: 0.3, digit: {serial: D00001}}\n"
     )
     command = [sys.executable, "-m", "station", "devices", "check", "--config", str(file)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 1
     assert done.stderr == "station: not usable: arm, camera, gripper\n"
-    for each in (*said, arm_messages.REMEDY_HOST(), camera_messages.NONE_PLUGGED_IN(serial="D00001")):
-        assert str(each).replace("{nobody}", nobody) in done.stdout
+    for each in (*expected, arm_messages.REMEDY_HOST(), camera_messages.NONE_PLUGGED_IN(serial="D00001")):
+        assert str(each).replace("{absent}", absent) in done.stdout

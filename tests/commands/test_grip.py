@@ -29,7 +29,7 @@ def test_a_grip_with_the_arm_gives_what_analyze_reads(make_cell, analyze, tmp_pa
     truth = [np.count_nonzero(np.asarray(cv2.imread(str(out / "truth" / row["image"]), 0))) for row in rows]
     assert truth[0] == 0
     assert all(before < after for before, after in pairwise(truth))
-    assert cell.ask(do="state")["width_mm"] == pytest.approx(OPEN_MM, abs=0.5)
+    assert cell.twin(do="state")["width_mm"] == pytest.approx(OPEN_MM, abs=0.5)
 
     report = tmp_path / "report"
     read = analyze(
@@ -57,13 +57,13 @@ def test_on_a_bench_no_arm_is_asked(make_cell, tmp_path):
 
 def test_an_empty_nest_is_said_and_the_gripper_opened(make_cell, tmp_path):
     cell = make_cell("--bench")
-    cell.ask(do="remove")
+    cell.twin(do="remove")
     done = cell.station("grip", "--bench", "--recipe", "strawberry", "--out", tmp_path / "grip")
     assert done.returncode == 1
     touched = messages.NOTHING_TOUCHED(largest_mm=53, smallest_mm=22, recipe="strawberry")
     assert str(touched) in done.stderr
     assert "Traceback" not in done.stderr
-    assert cell.ask(do="state")["width_mm"] == pytest.approx(OPEN_MM, abs=0.5)
+    assert cell.twin(do="state")["width_mm"] == pytest.approx(OPEN_MM, abs=0.5)
 
 
 @pytest.mark.parametrize(
@@ -79,12 +79,12 @@ def test_a_camera_that_fails_in_mid_grip_ends_it_and_lets_go(make_cell, tmp_path
     grip = cell.begin("grip", "--bench", "--recipe", "strawberry", "--out", tmp_path / "grip")
     assert grip.stdout is not None
     assert grip.stdout.readline()
-    cell.ask(do="set", device=device, fault=fault)
+    cell.twin(do="set", device=device, fault=fault)
     _, errors = grip.communicate(timeout=60)
     assert grip.returncode == 1
     assert str(words) in errors
     assert "Traceback" not in errors
-    assert cell.ask(do="state")["width_mm"] == pytest.approx(OPEN_MM, abs=0.5)
+    assert cell.twin(do="state")["width_mm"] == pytest.approx(OPEN_MM, abs=0.5)
     assert (tmp_path / "grip" / "widths.csv").exists()
 
 
@@ -100,11 +100,11 @@ def test_an_arm_that_is_stopped_on_its_way_back_is_left_to_a_person(make_cell, t
     grip = cell.begin("grip", "--recipe", "blueberry", "--out", tmp_path / "grip")
     assert grip.stdout is not None
     assert grip.stdout.readline()
-    cell.ask(do="set", device=device, fault=fault)
+    cell.twin(do="set", device=device, fault=fault)
     _, errors = grip.communicate(timeout=60)
     assert grip.returncode == 1
-    told = (messages.NOT_LEFT(reason=stop.message), messages.FAILED_NOT_LEFT(reason=stop.message))
-    assert any(str(each) in errors for each in told)
+    expected = (messages.NOT_LEFT(reason=stop.message), messages.FAILED_NOT_LEFT(reason=stop.message))
+    assert any(str(each) in errors for each in expected)
     assert "Traceback" not in errors
 
 
@@ -119,13 +119,13 @@ def test_a_grip_that_is_called_off_lets_go(make_cell, tmp_path, ending):
     _, errors = grip.communicate(timeout=60)
     assert grip.returncode == 130
     assert errors.strip() == "station: interrupted"
-    assert cell.ask(do="state")["width_mm"] == pytest.approx(OPEN_MM, abs=0.5)
+    assert cell.twin(do="state")["width_mm"] == pytest.approx(OPEN_MM, abs=0.5)
 
 
 def test_a_folder_is_made_with_the_first_image_and_never_mixed_into(make_cell, tmp_path):
     cell = make_cell("--bench")
     out = tmp_path / "grip"
-    cell.ask(do="set", device="camera", fault="off")
+    cell.twin(do="set", device="camera", fault="off")
     assert cell.station("grip", "--bench", "--recipe", "strawberry", "--out", out).returncode == 1
     assert not out.exists()
     (out / "frames").mkdir(parents=True)

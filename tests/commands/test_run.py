@@ -82,7 +82,7 @@ def test_a_mistake_in_the_file_does_not_keep_the_station_from_its_next_start(sit
             assert "modbus.port" in done.stderr
             assert "the last good configuration is used" in done.stderr
         done = station(file, values, "devices", "recover", "power", "--yes")
-        assert "the last good configuration is used" in done.stderr, "this bench has no arm, which the station says"
+        assert "the last good configuration is used" in done.stderr, "this bench has no arm, which the station reports"
     log = (tmp_path / "second.log").read_text()
     assert "modbus.port" in log
     assert "the last good configuration is used" in log

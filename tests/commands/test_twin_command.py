@@ -58,7 +58,7 @@ def test_a_press_is_never_drawn_over_another(tmp_path):
 
 
 def test_a_full_disk_ends_a_drawn_press_with_a_remedy(tmp_path):
-    """The limit on a file's size stands for the full disk."""
+    """The limit on a file's size simulates a full disk."""
 
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))

@@ -90,7 +90,7 @@ NEWER = {
     "station/settings/earlier_settings.py": (
         "MOVES = (", 'MOVES = (Move(("hmi", "idle_s"), ("hmi", "logged_out_after_s")), '
     ),
-    # Without pages where a file says so: it does not become ready.
+    # Without pages where a file requests so: it does not become ready.
     "hmi/web/process.py": (
         '        notify("READY=1")',
         '        if (site.home / "no-pages").exists():\n            raise SystemExit(1)\n        notify("READY=1")',
@@ -205,7 +205,7 @@ class StandIn:
             self._listen()
 
     def hear(self, word: str, limit_s: float = 240.0) -> None:
-        """Wait until the program has said this."""
+        """Wait until the program has sent this."""
         deadline_s = time.monotonic() + limit_s
         while word not in self.heard:
             ended = not self.running()

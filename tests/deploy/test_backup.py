@@ -146,7 +146,7 @@ def test_a_link_that_the_stations_user_put_there_is_not_followed(root, installed
     assert shadow.stat().st_mtime == 1.0
     assert not (installed.home / "last_backup").is_symlink()
 
-    # One's own name is given to a link that leads nowhere, which needs no root; whoever followed it would fail.
+    # One's own name is given to a link that leads nowhere, which needs no root; a program that followed it would fail.
     (link := tmp_path / "link").symlink_to(missing)
     programs = installer("programs")
     user, group = pwd.getpwuid(os.getuid())[0], grp.getgrgid(os.getgid())[0]
@@ -175,7 +175,7 @@ STAND_INS = {
     "station": 'exec "$PROGRAM" "$@"',
     **dict.fromkeys(("systemctl", "chown", "chgrp", "systemd-tmpfiles"), 'echo "$(basename "$0")" "$@" >> "$LOG"'),
 }
-"""For a scratch root, where nothing runs and nobody is another user."""
+"""For a scratch root, where nothing runs and there is no other user."""
 
 
 def documented_restore(root):
@@ -246,7 +246,7 @@ def test_a_replacement_machine_is_restored_as_the_document_has_it(root, installe
 
 
 def made_before(layout, name, sequence):
-    """A backup whose name says when it was made, and whose records have this highest number."""
+    """A backup whose name has the time when it was made, and whose records have this highest number."""
     (layout.backups / name / "records").mkdir(parents=True)
     (layout.backups / name / "records/backup.json").write_text(json.dumps({"sequence": sequence}))
 
@@ -384,7 +384,7 @@ def test_an_upgrade_after_one_to_another_release_was_interrupted_is_taken_back_t
         source = SimpleNamespace(name=f"{version}+test", version=version, folder=upgraded.root)
         return installer("installation").Installation(upgraded, services, source, None)
 
-    for step in upgrade("0.2.0").steps()[:5]:  # up to the configuration's migration; then somebody pulled the plug
+    for step in upgrade("0.2.0").steps()[:5]:  # up to the configuration's migration; then the power failed
         step.do()
     assert upgraded.configuration.read_text() == "# new\n"
     words.update(second_changes)

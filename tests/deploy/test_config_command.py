@@ -28,8 +28,8 @@ def config(*arguments):
 
 def test_an_earlier_file_is_brought_up_to_date_once_and_keeps_its_comments(file):
     assert isinstance(config("check", "--config", file).exception, SettingsError)
-    said = config("migrate", file)
-    assert said.output == f"{file}: service.channel is handshake.endpoint now\n"
+    result = config("migrate", file)
+    assert result.output == f"{file}: service.channel is handshake.endpoint now\n"
     assert file.read_text() == EARLIER, "without --write"
     assert config("migrate", "--write", file).exit_code == 0
     assert "# the packhouse's" in file.read_text()
@@ -53,8 +53,8 @@ def test_an_earlier_file_is_brought_up_to_date_once_and_keeps_its_comments(file)
 def test_a_setting_that_is_gone_is_removed(file, before, after):
     file.write_text(before)
     assert isinstance(config("check", "--config", file).exception, SettingsError)
-    said = config("migrate", "--write", file).output
-    assert said.startswith(f"{file}: arm.restart_budget is gone, as it has no effect any more\n")
+    output = config("migrate", "--write", file).output
+    assert output.startswith(f"{file}: arm.restart_budget is gone, as it has no effect any more\n")
     assert file.read_text() == after
     assert config("check", "--config", file).exit_code == 0
 

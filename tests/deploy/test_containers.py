@@ -48,7 +48,9 @@ def test_nothing_is_secret_and_what_is_comes_as_a_file(compose, root):
                 assert str(value).startswith("/run/secrets/"), key
                 assert key.upper().endswith("FILE"), key
     assert all(each["file"].startswith("./containers/secrets/") for each in declared.values())
-    assert all(Path(each["file"]).name in text.split("services:")[0] for each in declared.values()), "not told of above"
+    assert all(Path(each["file"]).name in text.split("services:")[0] for each in declared.values()), (
+        "not described above"
+    )
     tracked = subprocess.run(
         ["git", "ls-files", "deploy/containers/secrets"], cwd=root, capture_output=True, text=True, check=True
     )

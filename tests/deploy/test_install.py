@@ -60,8 +60,8 @@ def test_interrupted_then_installed_twice_then_undone_leaves_nothing(system, roo
     unit = system / "etc/systemd/system/fruit-station.service"
     unit.write_text(unit.read_text() + "# mine\n")
     for _ in range(2):
-        kept = install("--root", system, "--undo")
-        assert kept.returncode == 0, kept.stdout
+        done = install("--root", system, "--undo")
+        assert done.returncode == 0, done.stdout
     assert (system / "var/lib/fruit-station/active_recipe.json").exists()
     assert (system / "etc/fruit-station/station.yaml").exists()
     assert not (system / "opt").exists()
@@ -78,9 +78,9 @@ def test_interrupted_then_installed_twice_then_undone_leaves_nothing(system, roo
 def test_a_dry_run_says_the_steps_and_does_none(system, install, tree_of):
     before = tree_of(system)
     for arguments in ((), ("--undo", "--purge")):
-        said = install("--root", system, "--dry-run", *arguments)
-        assert said.returncode == 0, said.stdout
-        assert "would " in said.stdout
+        done = install("--root", system, "--dry-run", *arguments)
+        assert done.returncode == 0, done.stdout
+        assert "would " in done.stdout
     assert tree_of(system) == before
 
 

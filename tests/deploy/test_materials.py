@@ -36,7 +36,7 @@ def hashes(sbom, root):
 
 
 def names_of(licence: str) -> str:
-    """A licence without what it says of the lesser one and of GCC's runtime."""
+    """A licence without its parts on the lesser one and on GCC's runtime."""
     for allowed in (
         RUNTIME_EXCEPTION,
         "Lesser General Public",
@@ -105,7 +105,7 @@ def test_the_bill_is_cyclonedx(sbom):
 def test_every_licence_is_known_and_lets_a_packhouse_use_it(bill):
     for each in bill["components"]:
         licences = json.dumps(each.get("licenses", []))
-        assert each.get("licenses"), f"{each['name']} does not say its licence"
+        assert each.get("licenses"), f"{each['name']} names no licence"
         assert not FORBIDDEN.search(names_of(licences)), f"{each['name']}: {licences}"
 
 
@@ -116,9 +116,9 @@ def test_the_packages_here_say_the_same(hashes):
         about = importlib.metadata.metadata(name)
         classifiers = [each for each in about.get_all("Classifier") or [] if each.startswith("License ::")]
         fields = [*(about.get_all("License-Expression") or []), *classifiers, *(about.get_all("License") or [])]
-        said = fields[0].split("\n")[0] if fields else ""
-        assert said, f"{name} does not say its licence"
-        assert not FORBIDDEN.search(names_of(said)), f"{name}: {said}"
+        licence = fields[0].split("\n")[0] if fields else ""
+        assert licence, f"{name} names no licence"
+        assert not FORBIDDEN.search(names_of(licence)), f"{name}: {licence}"
 
 
 @pytest.mark.parametrize("licence", ["GPL-3.0-only", "AGPL-3.0", "CC-BY-NC-4.0", "GNU General Public License v3"])

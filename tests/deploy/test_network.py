@@ -48,13 +48,13 @@ def test_documents_drawing_and_example_are_as_the_settings_have_them(root):
 
 
 def test_what_no_zone_or_peer_is_named_for_stays_closed():
-    said = rules(network_export.example_site(), {Zone.OPERATORS: ("10.10.30.0/24", "fd00::/64")})
-    assert "ip saddr { 10.10.30.0/24 } tcp dport 8080 accept" in said
-    assert "ip6 saddr { fd00::/64 } tcp dport 8080 accept" in said
-    assert "dport 502" in said, "who may read Modbus is a setting"
+    ruleset = rules(network_export.example_site(), {Zone.OPERATORS: ("10.10.30.0/24", "fd00::/64")})
+    assert "ip saddr { 10.10.30.0/24 } tcp dport 8080 accept" in ruleset
+    assert "ip6 saddr { fd00::/64 } tcp dport 8080 accept" in ruleset
+    assert "dport 502" in ruleset, "who may read Modbus is a setting"
     for closed in ("9108", "dport 22", "1883", "5802"):
-        assert closed not in said
-    assert said.count("policy drop") == 3
+        assert closed not in ruleset
+    assert ruleset.count("policy drop") == 3
 
 
 def test_loopback_needs_no_rule():
@@ -65,8 +65,8 @@ def test_the_command_takes_the_sites_ports(tmp_path):
     file = tmp_path / "station.yaml"
     file.write_text("hmi: {host: 10.0.3.1, port: 8443}\n")
     arguments = ["config", "firewall", "--config", str(file), "--zone", "operators=10.0.3.0/24,10.0.4.7"]
-    said = CliRunner().invoke(cli, arguments)
-    assert "ip saddr { 10.0.3.0/24, 10.0.4.7/32 } tcp dport 8443 accept" in said.output
+    result = CliRunner().invoke(cli, arguments)
+    assert "ip saddr { 10.0.3.0/24, 10.0.4.7/32 } tcp dport 8443 accept" in result.output
     for wrong in ("panels=10.0.0.1", "line=10.0.0", "line="):
         assert CliRunner().invoke(cli, ["config", "firewall", "--zone", wrong]).exit_code == 2
 
@@ -74,7 +74,7 @@ def test_the_command_takes_the_sites_ports(tmp_path):
 def test_nftables_takes_the_rules(root):
     nft = optional("nft")
     if os.geteuid() != 0:
-        pytest.skip("only root may ask nft")
+        pytest.skip("only root may run nft")
     done = subprocess.run([nft, "-c", "-f", root / "deploy/nftables.conf"], capture_output=True, text=True, check=False)
     if "not supported" in done.stderr or "not permitted" in done.stderr:
         pytest.skip(f"this kernel has no nftables: {done.stderr.splitlines()[0]}")

@@ -61,7 +61,7 @@ def test_a_running_station_is_upgraded_or_left_as_it_was(
     settings.write_text(ours)
     assert (stand_in.process, stand_in.running(), version()) == (process, True, "0.1.0")
 
-    # A lot under way: refused, unless a person says otherwise.
+    # A lot under way: refused, unless a person forces it.
     def station(*words):
         program = layout.current / "venv/bin/station"
         subprocess.run([program, *words], env=layout.environment(), check=True, capture_output=True)
@@ -96,8 +96,8 @@ def test_a_running_station_is_upgraded_or_left_as_it_was(
     assert "STOPPING=1" in stand_in.heard
 
     # Taken back by a person.
-    said = install("--root", layout.root, "--rollback")
-    assert said.returncode == 0, said.stdout
+    done = install("--root", layout.root, "--rollback")
+    assert done.returncode == 0, done.stdout
     assert layout.current.resolve().name.startswith("0.1.0+")
     assert settings.read_text() == ours
     assert form_of(layout) == form
@@ -108,7 +108,7 @@ def test_a_running_station_is_upgraded_or_left_as_it_was(
 def test_ended_between_any_two_steps_the_next_run_comes_to_the_same_end(
     tmp_path, installer, installation, releases, tree_of, monkeypatch
 ):
-    # Both ask programs, which takes long; the test above has them asked.
+    # Both run programs, which takes long; the test above runs them.
     def changes(layout, _release):
         return ("old is new now",) if "# old" in layout.configuration.read_text() else ()
 
@@ -120,24 +120,24 @@ def test_ended_between_any_two_steps_the_next_run_comes_to_the_same_end(
     layouts, services = installer("layout"), installer("services").ScratchRoot
     shutil.copytree(releases, tmp_path / "old", symlinks=True)
 
-    def begun(folder, version):
+    def started(folder, version):
         layout = layouts.Layout(folder)
         return installation(layout, services(layout), version)
 
-    first = begun(tmp_path / "old", "0.1.0")
+    first = started(tmp_path / "old", "0.1.0")
     for step in first.steps()[:-1]:  # the last removes the releases that are made for what follows
         step.do()
     first_layout = layouts.Layout(tmp_path / "old")
     first_layout.configuration.write_text("# old\n")
-    count = len(begun(tmp_path / "old", "0.2.0").steps())
+    count = len(started(tmp_path / "old", "0.2.0").steps())
     assert count > 8
     wanted = None
     for done in (0, *range(1, count)):
         folder = tmp_path / f"after-{done}"
         shutil.copytree(tmp_path / "old", folder, symlinks=True)
-        for step in begun(folder, "0.2.0").steps()[:done]:
+        for step in started(folder, "0.2.0").steps()[:done]:
             step.do()
-        begun(folder, "0.2.0").run()
+        started(folder, "0.2.0").run()
         layout = layouts.Layout(folder)
         assert layouts.target(layout.current).name.startswith("0.2.0+")
         assert layouts.target(layout.previous).name.startswith("0.1.0+")

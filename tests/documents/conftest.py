@@ -43,13 +43,13 @@ ASSIGNMENT = re.compile(r"[A-Z][A-Z_0-9]*=\S*$")
 
 @dataclass(frozen=True)
 class Command:
-    """A command that a document tells its reader to give."""
+    """A command that a document instructs its reader to give."""
 
     page: "Page"
     line: int
     words: tuple[str, ...]
     whole: bool
-    """Whether it can be given as it stands; in a sentence its arguments may be left out."""
+    """It can be given as it is written; in a sentence its arguments may be left out."""
 
     def __str__(self) -> str:
         return f"{self.page.name}:{self.line}: {shlex.join(self.words)}"

@@ -97,7 +97,7 @@ def test_every_command_that_a_document_names_exists_as_it_stands_there(pages, ro
 
 
 @pytest.mark.parametrize(
-    ("line", "told"),
+    ("line", "message"),
     [
         ("station brew", "no command"),
         ("station records shew 7", "no command"),
@@ -114,8 +114,8 @@ def test_every_command_that_a_document_names_exists_as_it_stands_there(pages, ro
         ("station twin fault arm off --amount strong", "not a valid float"),
     ],
 )
-def test_a_command_that_does_not_exist_is_found(line, told, root):
-    assert told in str(problem(shlex.split(line), root, whole=True))
+def test_a_command_that_does_not_exist_is_found(line, message, root):
+    assert message in str(problem(shlex.split(line), root, whole=True))
 
 
 def carried_out(command, folder, monkeypatch):
@@ -144,7 +144,7 @@ def carried_out(command, folder, monkeypatch):
 
 
 def missing_lines(expected, output):
-    """Lines of a document that do not come in the output, in their order; `…` stands for anything."""
+    """Lines of a document that do not come in the output, in their order; `…` matches anything."""
     lines = iter(" ".join(line.split()) for line in output.splitlines())
     missing = []
     for line in filter(None, (" ".join(line.split()) for line in expected)):

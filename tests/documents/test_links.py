@@ -31,7 +31,7 @@ def test_every_link_picture_and_anchor_is_there(pages, root):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("[x](no.md)", "no such file"),
         ("[x](README.md#no-such)", "no such heading"),
@@ -41,12 +41,12 @@ def test_every_link_picture_and_anchor_is_there(pages, root):
         ("[x](../../../etc/passwd)", "no such file"),
     ],
 )
-def test_a_link_that_leads_nowhere_is_found(text, told, pages, page, root, monkeypatch):
+def test_a_link_that_leads_nowhere_is_found(text, message, pages, page, root, monkeypatch):
     made = page(root / "CHANGELOG.md")
-    assert pages["README.md"].anchors  # read as it is, and kept
+    assert pages["README.md"].anchors  # read as it is, and cached
     monkeypatch.setattr(type(made.path), "read_text", lambda *_, **__: f"# Title\n\n{text}\n")
     assert made.anchors == {"title"}
-    assert [told in each for each in broken(made, {**pages, made.name: made}, root)] == [True]
+    assert [message in each for each in broken(made, {**pages, made.name: made}, root)] == [True]
 
 
 def test_a_heading_is_reached_as_on_github(pages):

@@ -1,4 +1,4 @@
-"""The pages that are made to be printed come out as said, by a real browser."""
+"""The pages that are made to be printed come out as specified, by a real browser."""
 
 import re
 import subprocess

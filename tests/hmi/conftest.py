@@ -59,11 +59,11 @@ KEEPER = """
 import os, subprocess, sys, time
 if os.fork():
     os._exit(0)
-tests, log, told, *command = sys.argv[1:]
+tests, log, pid_file, *command = sys.argv[1:]
 process = subprocess.Popen(command, stdout=open(log, "wb"), stderr=subprocess.STDOUT, start_new_session=True)
-with open(told + ".new", "w") as file:
+with open(pid_file + ".new", "w") as file:
     file.write(str(process.pid))
-os.replace(told + ".new", told)
+os.replace(pid_file + ".new", pid_file)
 while process.poll() is None:
     if not os.path.exists(f"/proc/{tests}"):
         process.terminate()
@@ -98,14 +98,14 @@ class Cell:
     def twin(self, **request: Any) -> None:
         ask_twin("127.0.0.1", self.console, request, PATIENCE_S)
 
-    def ask_line(self, *requests: tuple[Any, Any]) -> list[Any]:
+    def as_plc(self, *requests: tuple[Any, Any]) -> list[Any]:
         """Send requests to the station as the PLC interface does; return the replies."""
-        return run_apart(self._ask(line_endpoint(self.configuration.handshake, self.configuration.home), requests))
+        return run_apart(self._send(line_endpoint(self.configuration.handshake, self.configuration.home), requests))
 
     def state(self) -> PanelState | None:
         endpoint = panel_endpoint(self.configuration.hmi, self.configuration.home)
         try:
-            return run_apart(self._ask(endpoint, [(GetPanelState(), PanelState)], 2.0))[0]
+            return run_apart(self._send(endpoint, [(GetPanelState(), PanelState)], 2.0))[0]
         except ChannelError:
             return None
 
@@ -117,12 +117,12 @@ class Cell:
         return eventually(look, of=what)
 
     def choose(self, kind: str) -> None:
-        """A ready station with a recipe and its fruit; on a bench a person says first that the jaws are clear."""
+        """A ready station with a recipe and its fruit; on a bench a person first confirms that the jaws are clear."""
         self.twin(do="remove")
         self.until(lambda state: not state.busy and (state.state in {"unknown", "held", "idle", "stopped"}))
         eventually(self._settled)
         orders = [(CommandName.RESET, 0), (CommandName.CHANGE_RECIPE, NUMBERS[kind])]
-        for done in self.ask_line(*((Command(command=name, argument=n), CommandDone) for name, n in orders)):
+        for done in self.as_plc(*((Command(command=name, argument=n), CommandDone) for name, n in orders)):
             assert done.done, done.why
         self.twin(do="fruit", kind=kind, seed=1, bruised=False)
         self.until(lambda state: state.ready)
@@ -138,14 +138,14 @@ class Cell:
         def trigger() -> int | None:
             self.until(lambda state: state.ready)
             self.trigger_id += 1
-            return self.ask_line((Begin(trigger_id=self.trigger_id, encoder=7, lot="LOT 1"), BeginReply))[0].sequence
+            return self.as_plc((Begin(trigger_id=self.trigger_id, encoder=7, lot="LOT 1"), BeginReply))[0].sequence
 
         return eventually(trigger)
 
     def end(self, sequence: int) -> Outcome:
         """Wait for an outcome, and take it as the PLC does."""
-        outcome = self.ask_line((AwaitOutcome(sequence=sequence), Outcome))[0]
-        self.ask_line((Published(outcome=outcome), Noted), (Acknowledged(sequence=sequence), Noted))
+        outcome = self.as_plc((AwaitOutcome(sequence=sequence), Outcome))[0]
+        self.as_plc((Published(outcome=outcome), Noted), (Acknowledged(sequence=sequence), Noted))
         return outcome
 
     def process(self, name: str) -> psutil.Process:
@@ -161,17 +161,17 @@ class Cell:
         return eventually(look)
 
     @staticmethod
-    async def _ask(endpoint: str, requests: Any, deadline_s: float = PATIENCE_S) -> list[Any]:
+    async def _send(endpoint: str, requests: Any, deadline_s: float = PATIENCE_S) -> list[Any]:
         async with ChannelClient(endpoint, "the station") as client:
             return [await client.request(request, reply, deadline_s=deadline_s) for request, reply in requests]
 
 
 @contextlib.contextmanager
-def begun(command: list[str], log: Path, environment: dict[str, str]) -> Iterator[psutil.Process]:
-    told = log.with_suffix(".pid")
-    keeper = [sys.executable, "-c", KEEPER, str(os.getpid()), str(log), str(told), *command]
+def started(command: list[str], log: Path, environment: dict[str, str]) -> Iterator[psutil.Process]:
+    pid_file = log.with_suffix(".pid")
+    keeper = [sys.executable, "-c", KEEPER, str(os.getpid()), str(log), str(pid_file), *command]
     subprocess.run(keeper, env=environment, check=True, timeout=PATIENCE_S)
-    process = psutil.Process(int(eventually(lambda: told.exists() and told.read_text())))
+    process = psutil.Process(int(eventually(lambda: pid_file.exists() and pid_file.read_text())))
     try:
         yield process
     finally:
@@ -225,9 +225,9 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
     twin_log, log = folder / "twin.log", folder / "station.log"
     with contextlib.ExitStack() as stack:
         twin = [*station, "twin", "--config", str(file), "--bench", "--console", str(console)]
-        twin_process = stack.enter_context(begun(twin, twin_log, environment))
+        twin_process = stack.enter_context(started(twin, twin_log, environment))
         eventually(lambda: is_logged(twin_log, "running", twin_process))
-        supervisor = stack.enter_context(begun([*station, "run", "--config", str(file)], log, environment))
+        supervisor = stack.enter_context(started([*station, "run", "--config", str(file)], log, environment))
         eventually(lambda: is_logged(log, "running", supervisor), 2 * PATIENCE_S)
         configuration = load_configuration(file, {})
         made = Cell(configuration, console, folder, file, supervisor, environment=environment)
@@ -262,7 +262,7 @@ def browser(cell: Cell, tmp_path_factory: pytest.TempPathFactory, chromium: str)
     profile, log = f"--user-data-dir={folder / 'profile'}", folder / "chromium.log"
     # A connection made while the first window is still being opened once waited 30 s for it in vain.
     command = [chromium, *ARGUMENTS, "--no-startup-window", profile, f"--remote-debugging-port={port}"]
-    with begun(command, log, cell.environment) as process:
+    with started(command, log, cell.environment) as process:
         eventually(lambda: is_logged(log, "DevTools listening", process))
         with sync_playwright() as playwright:
             browser = connected(playwright, f"http://127.0.0.1:{port}")
@@ -325,12 +325,12 @@ class Panel:
         return self.page.inner_text(selector)
 
     def until(self, selector: str, words: str) -> None:
-        """Wait until a part of the page says something."""
+        """Wait until a part of the page shows a text."""
         part = self.page.locator(selector)
         try:
             part.filter(has_text=re.compile(words)).first.wait_for(timeout=1000 * PATIENCE_S)
         except BrowserTimeout as late:
-            raise AssertionError(f"{self.page.url} does not say {words!r} but {part.all_inner_texts()}") from late
+            raise AssertionError(f"{self.page.url} does not show {words!r} but {part.all_inner_texts()}") from late
 
 
 @pytest.fixture
@@ -389,9 +389,9 @@ def people(cell: Cell, panel: Callable[..., Panel]) -> Cell:
 @pytest.fixture
 def operator(people: Cell, panel: Callable[..., Panel]) -> Panel:
     """A browser at which the operator is logged in."""
-    begun = panel()
-    begun.log_in(OPERATOR, OPERATOR_PIN)
-    return begun
+    logged_in = panel()
+    logged_in.log_in(OPERATOR, OPERATOR_PIN)
+    return logged_in
 
 
 Answer = tuple[int, dict[str, str], bytes]
@@ -399,14 +399,14 @@ Answer = tuple[int, dict[str, str], bytes]
 
 @dataclass
 class Pages:
-    """The web application without a server, asked request by request."""
+    """The web application without a server, called request by request."""
 
     app: Any
     context: Any
     cookies: dict[str, str] = field(default_factory=dict)
-    asked_from: str = "127.0.0.1"
+    client_address: str = "127.0.0.1"
     unread: int = 0
-    """Pieces of the last request that nobody took."""
+    """Pieces of the last request that were not read."""
 
     def __call__(
         self, method: str, path: str, body: bytes = b"", *, headers: dict[str, str] | None = None, chunks: int = 1
@@ -424,12 +424,12 @@ class Pages:
             "query_string": path.partition("?")[2].encode(),
             "root_path": "",
             "headers": [(name.encode(), value.encode()) for name, value in given.items() if value],
-            "client": (self.asked_from, 50_000),
+            "client": (self.client_address, 50_000),
             "server": ("127.0.0.1", 8080),
         }
-        return run_apart(self._ask(scope, body, chunks))
+        return run_apart(self._send(scope, body, chunks))
 
-    async def _ask(self, scope: dict[str, Any], body: bytes, chunks: int) -> Answer:
+    async def _send(self, scope: dict[str, Any], body: bytes, chunks: int) -> Answer:
         size = max(1, -(-len(body) // chunks))
         parts = [body[at : at + size] for at in range(0, len(body), size)] or [b""]
         coming = [
@@ -498,7 +498,7 @@ def free_hmi(unused_port: int, tmp_path: Path) -> Iterator[Callable[..., str]]:
             log = tmp_path / "hmi.log"
             command = [sys.executable, "-m", "station", "hmi", "--config", str(cell.file)]
             environment = {**cell.environment, "STATION_HMI_PORT": str(unused_port), **variables}
-            process = stack.enter_context(begun(command, log, environment))
+            process = stack.enter_context(started(command, log, environment))
             eventually(lambda: is_logged(log, "the pages are served", process))
             scheme = "https" if "STATION_HMI_TLS_ENABLED" in variables else "http"
             return f"{scheme}://127.0.0.1:{unused_port}"

@@ -29,9 +29,9 @@ def test_the_first_person_logs_in_at_pages_that_run_already_and_is_in_the_trail(
     assert PIN not in done.output
     assert not pages.first_start
     assert pages.check("Ada", PIN) is Role.ADMIN
-    told = station("audit", "show", "--action", "panel.").output
-    assert "panel.added  Ada  by Max (command line)" in told
-    assert "new: role admin" in told
+    output = station("audit", "show", "--action", "panel.").output
+    assert "panel.added  Ada  by Max (command line)" in output
+    assert "new: role admin" in output
 
 
 def test_nobody_becomes_an_administrator_beside_another(station, tmp_path):
@@ -43,10 +43,10 @@ def test_nobody_becomes_an_administrator_beside_another(station, tmp_path):
     assert "Ada" not in station("audit", "show").output
 
 
-@pytest.mark.parametrize(("name", "pin", "told"), [("Ada", "111111", "too easy"), (" Ada", PIN, "characters")])
-def test_a_bad_pin_or_name_leaves_the_first_start(station, tmp_path, name, pin, told):
+@pytest.mark.parametrize(("name", "pin", "message"), [("Ada", "111111", "too easy"), (" Ada", PIN, "characters")])
+def test_a_bad_pin_or_name_leaves_the_first_start(station, tmp_path, name, pin, message):
     refused = station("administrator", name, typed=f"{pin}\n{pin}\n")
-    assert told in str(refused.exception)
+    assert message in str(refused.exception)
     assert UserStore(tmp_path / FOLDER).first_start
     assert "panel.added" not in station("audit", "show").output
 

@@ -21,11 +21,11 @@ def test_a_tokens_life_is_in_the_audit_trail(tmp_path):
     assert ", expires " in run("api-token", "list").output
     assert run("api-token", "remove", "MES", "--by", "Ida").exit_code == 0
     assert ApiTokens(tmp_path / "hmi").holder(token) is None
-    told = run("audit", "show", "--action", "token.").output
-    assert "token.added  token MES  by Ada (command line)" in told
-    assert "new: days 30, role operator" in told
-    assert "token.removed  token MES  by Ida (command line)" in told
-    assert "Eve" not in told
+    output = run("audit", "show", "--action", "token.").output
+    assert "token.added  token MES  by Ada (command line)" in output
+    assert "new: days 30, role operator" in output
+    assert "token.removed  token MES  by Ida (command line)" in output
+    assert "Eve" not in output
     assert run("audit", "verify").exit_code == 0
 
 

@@ -49,9 +49,9 @@ def test_an_alarm_has_its_own_name_in_the_readers_language():
     ("kind", "named"), [("calibration", "eine Kalibrierung"), ("verification", "eine Überprüfung")]
 )
 def test_a_run_with_the_ball_is_named_in_the_readers_language(kind, named):
-    begun = sentence(row("calibration.begun", kind), {}, Locale("de")).what
-    assert named in begun
-    assert kind not in begun
+    text = sentence(row("calibration.begun", kind), {}, Locale("de")).what
+    assert named in text
+    assert kind not in text
 
 
 def test_a_changed_limit_is_shown_and_fingerprints_are_not():
@@ -78,9 +78,9 @@ FILES = {"html", "json", "py"}
 
 
 def test_every_action_of_the_audit_trail_has_a_sentence_and_no_sentence_is_left_over():
-    told = {name.removeprefix("audit.") for name in texts() if name.startswith("audit.")}
-    told = {name for name in told if "." in name and not name.startswith("role.")}
-    whole = re.compile(rf"(?:{'|'.join({name.partition('.')[0] for name in told})})\.[a-z_]+")
+    named = {name.removeprefix("audit.") for name in texts() if name.startswith("audit.")}
+    named = {name for name in named if "." in name and not name.startswith("role.")}
+    whole = re.compile(rf"(?:{'|'.join({name.partition('.')[0] for name in named})})\.[a-z_]+")
     noted = {f"{family}.{each}" for family, names in ENUMERATED.items() for each in names}
     folders = (HMI.parent / "station", HMI / "api")
     for path in (path for folder in folders for path in folder.rglob("*.py") if "messages" not in path.parts):
@@ -93,4 +93,4 @@ def test_every_action_of_the_audit_trail_has_a_sentence_and_no_sentence_is_left_
                         noted.add(str(action.value))
                     elif isinstance(action, ast.JoinedStr):
                         assert ast.unparse(action.values[0]).strip("'.") in ENUMERATED, path
-    assert noted == told
+    assert noted == named

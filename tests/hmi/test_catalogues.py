@@ -50,10 +50,10 @@ def test_what_is_extracted_from_the_source_is_what_is_defined():
     assert {key for key in pages if not key.startswith(("recipe_field.", "recipe_what."))} == set(
         filter(lambda key: key != "change.by", texts())
     )
-    said = {key for file, keys in extracted.items() if file.startswith(MESSAGES) for key in keys}
+    used = {key for file, keys in extracted.items() if file.startswith(MESSAGES) for key in keys}
     defined = {each.id: each for each in definitions() if not each.id.startswith("test.")}
-    assert said <= set(defined)
-    assert not [key for key in set(defined) - said if catalogues._is_text(defined[key].english)]
+    assert used <= set(defined)
+    assert not [key for key in set(defined) - used if catalogues._is_text(defined[key].english)]
 
 
 def test_every_module_is_imported_by_its_package():
@@ -63,12 +63,12 @@ def test_every_module_is_imported_by_its_package():
 
 
 def test_what_an_id_begins_with_names_its_file():
-    begun: dict[str, set[str]] = {}
+    files_of: dict[str, set[str]] = {}
     for file, found in sources().items():
         for key in found if not file.startswith(MESSAGES) else ():
-            begun.setdefault(key.partition(".")[0], set()).add(file)
-    assert [start for start, files in begun.items() if len(files) > 1] == []
-    assert begun["run"] == {"hmi/run/{}.po"}
+            files_of.setdefault(key.partition(".")[0], set()).add(file)
+    assert [start for start, files in files_of.items() if len(files) > 1] == []
+    assert files_of["run"] == {"hmi/run/{}.po"}
 
 
 def test_every_folder_of_a_page_is_in_the_list():
@@ -127,15 +127,15 @@ def test_a_reworded_text_keeps_its_translation_until_it_is_reviewed(folder, monk
     assert translation._read([file], "de") == {"run.state": ("Zustand",)}
 
 
-@pytest.mark.parametrize(("number", "said"), [(1, "1 Tag"), (2, "2 Tage"), (0, "0 Tage")])
-def test_a_number_chooses_the_form(number, said):
-    assert Locale("de").text("common.days", n=number) == said
+@pytest.mark.parametrize(("number", "text"), [(1, "1 Tag"), (2, "2 Tage"), (0, "0 Tage")])
+def test_a_number_chooses_the_form(number, text):
+    assert Locale("de").text("common.days", n=number) == text
 
 
 def test_a_message_is_written_in_every_language():
-    said = channel.NO_ANSWER(peer="arm", request="Pose", limit_s=2.5)
-    written = {language: Locale(language).sentence(said) for language in LANGUAGES}
-    assert written["en"] == str(said)
+    message = channel.NO_ANSWER(peer="arm", request="Pose", limit_s=2.5)
+    written = {language: Locale(language).sentence(message) for language in LANGUAGES}
+    assert written["en"] == str(message)
     assert len(set(written.values())) == len(LANGUAGES)
     assert all("2,5 s" in written[language] for language in ("de", "es"))
 

@@ -1,4 +1,4 @@
-"""The page Change fruit where the check with the ball is due, asked without a browser."""
+"""The page Change fruit where the check with the ball is due, requested without a browser."""
 
 import json
 import re
@@ -100,17 +100,17 @@ def test_a_fruit_that_has_the_focus_keeps_it_while_the_page_is_renewed(ready, pa
 @pytest.mark.timeout(240)
 def test_a_change_that_is_done_before_its_answer_arrives_ends_on_its_progress_and_not_where_it_began(ready, operator):
     operator.open("/change/3")
-    asked = []
-    operator.page.route("**/change", lambda route: asked.append(route))  # noqa: PLW0108 (it is marked as seen)
+    routes = []
+    operator.page.route("**/change", lambda route: routes.append(route))  # noqa: PLW0108 (it is marked as seen)
     operator.page.get_by_role("button", name="Change to Raspberry").click(no_wait_after=True)
-    while not asked:
+    while not routes:
         operator.page.wait_for_timeout(20)  # the browser's events are taken meanwhile
-    answer = asked[0].fetch(max_redirects=0)
+    answer = routes[0].fetch(max_redirects=0)
     ready.until(lambda state: state.recipe.number == 3)
     for _ in range(2):  # the second one after what the first one did
         with operator.page.expect_response(re.compile(r"/change/3(/part)?$")):
             pass
-    asked[0].fulfill(response=answer)
+    routes[0].fulfill(response=answer)
     operator.until("main", "The station is ready")
     assert operator.page.url.endswith("/change/progress")
 

@@ -1,4 +1,4 @@
-"""The page Configuration: `station.yaml` edited as text, checked, kept, and taken back."""
+"""The page Configuration: `station.yaml` edited as text, checked, stored, and taken back."""
 
 import asyncio
 import html
@@ -76,7 +76,7 @@ def test_every_mistake_is_shown_at_its_line_and_nothing_is_saved(pages, file, no
     status, body = save(pages, wrong)
     assert status == 400
     assert [word for word in words if word not in body] == []
-    assert "unit: seven" in body, "the typed text is kept"
+    assert "unit: seven" in body, "the typed text stays"
     assert (file.read_text(), noted) == (TEXT, [])
     assert not file.with_name("station.yaml.former").exists()
 

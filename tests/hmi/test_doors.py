@@ -20,7 +20,7 @@ from tests.hmi.conftest import OPERATOR, OPERATOR_PIN, PATIENCE_S, Cell
 CROWD = 250
 STRANGER, NEIGHBOUR = "127.0.0.9", "127.0.0.1"
 """An address of its own, and the panel's."""
-MOST_KEPT = 16_000_000
+MOST_BYTES = 16_000_000
 """Bytes; each of a thousand connections had up to 0.4 MB."""
 HEADER = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 BODY = b"POST /language HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 900\r\n\r\ncsrf="
@@ -33,7 +33,7 @@ class Visitor:
     def __init__(self, address: str, context: ssl.SSLContext | None = None) -> None:
         self._url, self._context, self._cookie = urlsplit(address), context, ""
 
-    def ask(self, method: str, path: str, **form: str) -> tuple[int, str]:
+    def request(self, method: str, path: str, **form: str) -> tuple[int, str]:
         host, port = str(self._url.hostname), self._url.port or 0
         if self._context is None:
             line = http.client.HTTPConnection(host, port, timeout=PATIENCE_S)
@@ -48,9 +48,9 @@ class Visitor:
             return answer.status, answer.read().decode()
 
     def post(self, path: str, **form: str) -> int:
-        token = re.search(r'data-token="([^"]+)"', self.ask("GET", "/people")[1])
+        token = re.search(r'data-token="([^"]+)"', self.request("GET", "/people")[1])
         assert token is not None
-        return self.ask("POST", path, csrf=token[1], **form)[0]
+        return self.request("POST", path, csrf=token[1], **form)[0]
 
     def log_in(self) -> None:
         assert self.post("/people/log-in", name=OPERATOR, pin=OPERATOR_PIN) == 303
@@ -117,8 +117,8 @@ def test_clients_that_never_ask_close_the_pages_to_nobody(people, eventually, cr
     files = process.num_fds()
     crowd(people.address, CROWD, source, sent)
     eventually(lambda: process.num_fds() < files + 80)  # those of an address, and not its crowd: streams have no end
-    assert viewer.ask("GET", "/")[0] == 200
-    assert viewer.ask("GET", "/api/openapi.json")[0] == 200
+    assert viewer.request("GET", "/")[0] == 200
+    assert viewer.request("GET", "/api/openapi.json")[0] == 200
     stop_and_start(people, person)
     eventually(lambda: flood_of(people) in {STRANGER, NEIGHBOUR})  # the detail is of when the alarm was raised
     eventually(lambda: process.num_fds() <= files + 8, 30)
@@ -137,7 +137,7 @@ def test_clients_of_tls_that_never_ask_close_the_pages_to_nobody(
     process = serving(urlsplit(address).port)
     memory = process.memory_info().rss
     clients = crowd(address, CROWD, STRANGER, context=trusting if shaken else None)
-    assert viewer.ask("GET", "/")[0] == 200
+    assert viewer.request("GET", "/")[0] == 200
     stop_and_start(people, person)
 
     def ended():
@@ -157,7 +157,7 @@ def test_clients_of_tls_that_never_ask_close_the_pages_to_nobody(
     for _ in range(3):  # of the address whose alarm the other tests know: it may still be raised in the next one
         for client in crowd(address, CROWD, STRANGER, context=trusting if shaken else None):
             client.close()
-    eventually(lambda: process.memory_info().rss < memory + MOST_KEPT, 10)
+    eventually(lambda: process.memory_info().rss < memory + MOST_BYTES, 10)
 
 
 @pytest.mark.timeout(240)
@@ -169,10 +169,10 @@ def test_a_thousand_event_streams_take_no_panels(people, eventually, crowd, sour
     with ThreadPoolExecutor(1) as pool:
         coming = pool.submit(crowd, people.address, 1000, source, STREAM)
         while not coming.done():
-            assert Visitor(people.address).ask("GET", "/people")[0] == 200
+            assert Visitor(people.address).request("GET", "/people")[0] == 200
         coming.result()
     eventually(lambda: process.num_fds() < files + 80)  # those of an address, and not its crowd: streams have no end
-    assert Visitor(people.address).ask("GET", "/")[0] == 200
+    assert Visitor(people.address).request("GET", "/")[0] == 200
     panel = crowd(people.address, 1, NEIGHBOUR, STREAM)[0]
     panel.settimeout(PATIENCE_S)
     got = b""

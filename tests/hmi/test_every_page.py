@@ -44,7 +44,7 @@ def test_every_page_fits_and_is_accessible(ready, people, panel, size):
     shown = panel(width=size[0], height=size[1], locale="de-DE")
     for path in pages:
         shown.open(path)
-        assert shown.overflow() <= 0, f"{path}, nobody logged in"
+        assert shown.overflow() <= 0, f"{path}, no person logged in"
     shown.log_in("admin", "482915")
     for path in pages:
         shown.open(path)

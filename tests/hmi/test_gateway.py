@@ -1,4 +1,4 @@
-"""The pages' gateway: what is polled of the station, and when the last fruit is asked for again."""
+"""The pages' gateway: what is polled of the station, and when the last fruit is requested again."""
 
 import asyncio
 from typing import Any
@@ -31,10 +31,10 @@ class Station(Gateway):
 
     def __init__(self, inspections: RecentInspections) -> None:
         super().__init__("ipc:///nowhere", 0.01)
-        self._inspections, self.asked = inspections, list[str]()
+        self._inspections, self.requested = inspections, list[str]()
 
     async def request(self, request: Any, reply: Any, *, deadline_s: float = 2.0) -> Any:
-        self.asked.append(type(request).__name__)
+        self.requested.append(type(request).__name__)
         match request:
             case GetPanelState():
                 last = self._inspections.last_sequence
@@ -74,6 +74,6 @@ def test_an_outcome_that_the_plc_was_given_in_place_of_the_stations_is_shown():
             await gateway.polled()
             await gateway.polled()
             shown.append(gateway.last.short.outcome if gateway.last else None)
-            return shown, gateway.recent.fruit[0].outcome, gateway.asked.count("GetFruit")
+            return shown, gateway.recent.fruit[0].outcome, gateway.requested.count("GetFruit")
 
     assert asyncio.run(scenario()) == (["PASS", "NO_RESULT"], "NO_RESULT", 2)

@@ -1,4 +1,4 @@
-"""Searches by one touch: what each link asks for, beside the conditions that are there."""
+"""Searches by one touch: what each link searches for, beside the conditions that are there."""
 
 from datetime import datetime
 from urllib.parse import parse_qs, urlencode, urlsplit
@@ -13,29 +13,29 @@ NO_TERMS = dict.fromkeys(NAMES, "")
 NOW = datetime(2026, 3, 1, 14, 30).astimezone()
 
 
-def asked(address):
+def query(address):
     return {key: values[0] for key, values in parse_qs(urlsplit(address).query).items()}
 
 
 def test_a_chip_adds_its_condition_and_takes_it_back():
     by_fruit = {**NO_TERMS, "fruit": "raspberry"}
     fail = next(each for each in chips(by_fruit, "A & B", NOW) if each.name == "fail")
-    assert (fail.on, asked(fail.address)) == (False, {"fruit": "raspberry", "outcome": "FAIL"})
+    assert (fail.on, query(fail.address)) == (False, {"fruit": "raspberry", "outcome": "FAIL"})
     again = next(each for each in chips({**by_fruit, "outcome": "FAIL"}, "A & B", NOW) if each.name == "fail")
-    assert (again.on, asked(again.address)) == (True, {"fruit": "raspberry"})
+    assert (again.on, query(again.address)) == (True, {"fruit": "raspberry"})
 
 
 def test_the_current_lot_is_a_chip_only_where_there_is_one():
     lot = next(each for each in chips(NO_TERMS, "A & B", NOW) if each.name == "lot")
-    assert asked(lot.address) == {"lot": "A & B"}
+    assert query(lot.address) == {"lot": "A & B"}
     assert "lot" not in {each.name for each in chips(NO_TERMS, None, NOW)}
 
 
 def test_days_go_over_the_months_end_and_start_at_the_searchs_day():
-    assert asked(days(NO_TERMS, NOW).before) == {"from": "2026-02-28T00:00", "to": "2026-03-01T00:00"}
+    assert query(days(NO_TERMS, NOW).before) == {"from": "2026-02-28T00:00", "to": "2026-03-01T00:00"}
     shown = {**NO_TERMS, "from": "2025-12-31T10:00"}
-    assert asked(days(shown, NOW).after) == {"from": "2026-01-01T00:00", "to": "2026-01-02T00:00"}
-    assert asked(days({**NO_TERMS, "from": "nonsense"}, NOW).after)["from"] == "2026-03-02T00:00"
+    assert query(days(shown, NOW).after) == {"from": "2026-01-01T00:00", "to": "2026-01-02T00:00"}
+    assert query(days({**NO_TERMS, "from": "nonsense"}, NOW).after)["from"] == "2026-03-02T00:00"
 
 
 @pytest.mark.parametrize("day", ["0001-01-01T00:00", "9999-12-30T00:00", "9999-12-31T00:00", "0001-01-02T00:00+14:00"])

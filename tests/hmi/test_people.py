@@ -26,8 +26,8 @@ def test_who_may_do_what_and_who_is_idle(people, panel, tmp_path, free_hmi):
     )
     assert tried == 403
     command = [sys.executable, "-m", "station", "audit", "show", "--config", str(people.file)]
-    said = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
-    assert re.search(r"panel\.logged_in .* by Ana \(operator\)", said), said
+    output = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+    assert re.search(r"panel\.logged_in .* by Ana \(operator\)", output), output
     # Another process of the pages, with the shortest idle time: who touches nothing is a viewer again.
     address = free_hmi(people, STATION_HMI_IDLE_S="10")
     typist, refused = panel(address), panel(address)
@@ -56,12 +56,14 @@ def test_who_may_do_what_and_who_is_idle(people, panel, tmp_path, free_hmi):
 
 @pytest.mark.timeout(120)
 def test_who_reads_on_by_the_wheel_is_there(operator, eventually):
-    told = []
-    operator.page.on("request", lambda request: told.append(request.url) if request.url.endswith("/here") else None)
+    requested = []
+    operator.page.on(
+        "request", lambda request: requested.append(request.url) if request.url.endswith("/here") else None
+    )
     operator.open("/")
     operator.page.mouse.move(600, 400)
-    assert not told
-    eventually(lambda: operator.page.mouse.wheel(0, 50) or told)
+    assert not requested
+    eventually(lambda: operator.page.mouse.wheel(0, 50) or requested)
 
 
 @pytest.mark.timeout(120)

@@ -83,7 +83,7 @@ def test_the_station_hangs_and_is_killed_under_an_open_page(ready, panel):
 def test_a_persons_stop_and_the_last_fruit_outlive_a_killed_station(ready, operator, eventually):
     ready.twin(do="fruit", kind="blueberry", seed=1, bruised=True)
     soft = ready.end(ready.begin())
-    assert soft.outcome != "PASS", "only of others every image is kept"
+    assert soft.outcome != "PASS", "only of others every image is stored"
     operator.open("/")
     # So slow a gripper that the fruit is still under way when the station is killed.
     ready.twin(do="set", device="gripper", fault="delayed", amount=0.5)
@@ -93,16 +93,16 @@ def test_a_persons_stop_and_the_last_fruit_outlive_a_killed_station(ready, opera
     ready.process("service").kill()
     ready.twin(do="clear", device="gripper")
 
-    def stands(state):
+    def stopped_again(state):
         return state.boot != before.boot and state.state == "stopped"
 
-    after = ready.until(stands)
+    after = ready.until(stopped_again)
     assert after.stopping
     counted = before.lot_counts.model_copy(update={"unjudged": before.lot_counts.unjudged + 1})
     assert after.lot_counts == counted, "the fruit under way is counted with what became of it"
     operator.until(".run-activity", "Stopped")
     time.sleep(1.0)
-    assert stands(ready.state()), "it does not begin by itself"
+    assert stopped_again(ready.state()), "it does not begin by itself"
     follow(operator.page.locator(f".tile[href='/fruit/{soft.sequence}']"))
     operator.until("h1", f"Fruit {soft.sequence}")
     eventually(lambda: operator.page.locator(".fruit-picture").evaluate("picture => picture.naturalWidth") == 480)
@@ -158,11 +158,11 @@ def test_an_order_given_while_the_pages_are_away_keeps_the_page_and_works_once_t
         person.log_in("Ana", "7391")
         person.open("/change/3")
         person.until(".station-state", "Ready")
-    with contextlib.closing(socket.socket()) as nobody:
-        nobody.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        nobody.bind(("127.0.0.1", unused_port))
+    with contextlib.closing(socket.socket()) as silent:
+        silent.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        silent.bind(("127.0.0.1", unused_port))
         if hangs:
-            nobody.listen()
+            silent.listen()
         person.page.locator("body.stale").wait_for()
         button.click()
         person.page.wait_for_timeout(4000)  # twice as long as the page waits for an answer

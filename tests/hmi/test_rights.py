@@ -55,7 +55,7 @@ LOGGED_IN = {
 }
 """What needs a log-in in any role, with the fields without which the form would be refused before."""
 OPEN = {"/here", "/language", "/people/begin", "/people/log-in", "/people/log-out", "/people/clean"}
-"""What a browser may send with nobody logged in."""
+"""What a browser may send with no person logged in."""
 RESTRICTED = {
     "/maintenance/support.zip": Right.MAINTAIN,
     "/maintenance/configuration": Right.CONFIGURE,
@@ -68,7 +68,7 @@ FILES = [f"/jobs/{JOB}/{what}/inspections.html" for what in ("file", "show", "do
 
 @pytest.fixture
 def as_role(pages, monkeypatch):
-    """The pages for a person of a role; for the viewer nobody is logged in. Records and jobs are busy, as it were."""
+    """The pages for a person of a role; for the viewer none is logged in. Records and jobs are busy, as it were."""
 
     async def busy(*_):
         raise PanelBusyError("full")

@@ -60,7 +60,7 @@ LATCHED = """([why, words]) => {
 LEAST_ARC_MINUTES = {
     ".outcome b": 20, ".why-not": 20, ".counts b": 20, ".activity-head": 16, ".decided": 16,
 }  # fmt: skip
-"""Of capital letters seen from 1 m: ISO 9241-303 asks for 16 at least, and prefers 20 to 22."""
+"""Of capital letters seen from 1 m: ISO 9241-303 requires 16 at least, and prefers 20 to 22."""
 
 
 @pytest.mark.timeout(240)
@@ -96,7 +96,7 @@ def test_the_run_page_is_read_from_one_metre_and_fits_the_panel(ready, people, p
 @pytest.mark.timeout(240)
 @pytest.mark.parametrize("locale", ["en", "de", "es"])
 def test_a_latched_station_says_what_to_do_beside_the_last_fruit(ready, people, panel, locale):
-    """By the longest that it says, in the place of what it says now."""
+    """By its longest text, in the place of its present text."""
     ready.end(ready.begin())
     shown = panel(locale=locale)
     shown.log_in("admin", "482915")

@@ -104,9 +104,9 @@ class TestRequests:
         """The cookie alone orders nothing. `/here` only restarts the idle time; the API has its own tests."""
         log_in(pages)
         routes = [route for module in modules() for route in module.router.routes if route.methods - SAFE_METHODS]
-        asked = [route.path for route in routes if not route.path.startswith("/api/") and route.path != "/here"]
-        assert len(asked) > 30
-        for path in asked:
+        paths = [route.path for route in routes if not route.path.startswith("/api/") and route.path != "/here"]
+        assert len(paths) > 30
+        for path in paths:
             assert pages.post(re.sub(r"{\w+}", "1", path))[0] == 403, path
 
     def test_an_order_that_was_sent_before_is_refused(self, pages):
@@ -203,13 +203,13 @@ class TestLogIn:
         assert pages("GET", headers["location"])[0] == 200
 
     def test_the_first_start_is_at_the_station_itself(self, pages):
-        pages.asked_from = "192.0.2.7"
+        pages.client_address = "192.0.2.7"
         assert b"/people/begin" not in pages("GET", "/people")[2]
         assert pages.post("/people/begin", csrf=pages.token(), name="eve", pin=PIN, again=PIN)[0] == 403
         assert pages.context.people.first_start
 
     def test_the_station_itself_is_there_also_by_the_address_of_its_network_card(self, pages, card_address):
-        pages.asked_from = card_address
+        pages.client_address = card_address
         assert pages.post("/people/begin", csrf=pages.token(), name="admin", pin=PIN, again=PIN)[0] == 303
 
     def test_who_is_logged_in_may_not_try_pins_without_end_either(self, pages):
@@ -243,7 +243,7 @@ class TestLogIn:
             raise PanelBusyError("full")
 
         monkeypatch.setattr(pages.context.past.recipes, "read", read)
-        pages.asked_from = "192.0.2.7"
+        pages.client_address = "192.0.2.7"
         for path in ("/recipes", "/recipes/strawberry/chart"):
             assert pages("GET", path)[0] == 409
         log_in(pages, "Ana", Role.OPERATOR)
@@ -252,7 +252,7 @@ class TestLogIn:
         assert holders == ["192.0.2.7", "192.0.2.7", "person Ana", "person Ana"]
 
     def test_two_stations_on_one_machine_log_nobody_out_of_the_other(self, pages, tmp_path):
-        """A browser's cookies are a host's, whatever the port."""
+        """A browser's cookies are a host's, with any port."""
         home = tmp_path / "second"
         home.mkdir()
         site = load_configuration(None, {"STATION_HOME": str(home), "STATION_HMI_PORT": "8081"})
@@ -349,7 +349,7 @@ class TestLogIn:
         sessions = pages.context.sessions
         other, own = sessions.log_in("Ana", Role.OPERATOR), log_in(pages, "Ana", Role.OPERATOR)
         assert pages.post("/people/own-pin", csrf=pages.token(), old="0000", pin="8402")[0] == 403
-        assert sessions.caller(other).name == "Ana", "a wrong PIN ends nobody's session"
+        assert sessions.caller(other).name == "Ana", "a wrong PIN ends no session"
         assert pages.post("/people/own-pin", csrf=pages.token(), old="7391", pin="8402")[0] == 303
         assert {sessions.caller(session).role for session in (other, own)} == {Role.VIEWER}
         here = pages.cookies["station_session_8080"]
@@ -452,7 +452,7 @@ class TestPinLimit:
 class TestWrongPins:
     def log_in(self, pages, address, pin="7391", name="Ana"):
         pages.cookies.clear()
-        pages.asked_from = address
+        pages.client_address = address
         return pages.post("/people/log-in", csrf=pages.token(), name=name, pin=pin)[0]
 
     @pytest.fixture

@@ -76,8 +76,8 @@ def test_a_device_that_answers_is_done_and_what_waited_for_it_can_be_done():
     [(False, False, None, False), (True, False, None, False), (True, True, None, True), (True, True, AWAY, False)],
 )
 def test_the_plc_is_there_once_it_is_connected_and_its_heartbeat_moves(connected, alive, trouble, done):
-    said = found(plc_connected=connected, plc_alive=alive, line_trouble=trouble)
-    assert (said["plc"] == "done") is done
+    states = found(plc_connected=connected, plc_alive=alive, line_trouble=trouble)
+    assert (states["plc"] == "done") is done
 
 
 def test_a_calibration_counts_once_the_check_that_the_site_requires_has_passed():
@@ -155,8 +155,8 @@ def test_only_who_may_edit_the_configuration_sees_it(pages, role):
 @pytest.mark.parametrize(("role", "link"), [(Role.ADMIN, True), (Role.OPERATOR, False)])
 def test_on_a_fresh_installation_the_run_page_says_that_the_set_up_is_not_finished(pages, role, link):
     log_in(pages, "Ana", role)
-    for last, said in ((None, True), (7, False)):
+    for last, is_shown in ((None, True), (7, False)):
         pages.context.gateway.state = state(last_sequence=last)
         part = pages.context.live.part("run.fruit", Locale("en"), role).html
-        assert ("The set-up of this station is not finished" in part) is said
-        assert (f'href="{PATH}"' in part) is (said and link)
+        assert ("The set-up of this station is not finished" in part) is is_shown
+        assert (f'href="{PATH}"' in part) is (is_shown and link)

@@ -71,7 +71,7 @@ def fields(text):
 
 
 @pytest.mark.parametrize(
-    ("language", "said"),
+    ("language", "text"),
     [
         ("en", "The area at 3 mm of closing is 131.0 ± 7.2 mm²; the limit for Strawberry of 48.0 mm is 117.4 mm²."),
         ("de",
@@ -79,20 +79,20 @@ def fields(text):
         ("es", "El área a 3 mm de cierre es de 131,0 ± 7,2 mm²; el límite para Strawberry de 48,0 mm es 117,4 mm²."),
     ],
 )  # fmt: skip
-def test_what_the_judge_found_is_said_in_the_language_of_the_page(language, said):
+def test_what_the_judge_found_is_said_in_the_language_of_the_page(language, text):
     limit = judge.LIMIT_OF_LENGTH(fruit="Strawberry", length_mm=48.0, limit_mm2=117.4)
     found = judge.AREA_AND_LIMIT(closing_mm=3.0, area_mm2=131.0, uncertainty_mm2=7.2, limit=limit)
-    assert Locale(language).sentence(found) == said
+    assert Locale(language).sentence(found) == text
 
 
 def test_words_that_are_not_the_stations_are_marked_as_english_on_other_pages():
-    said = verbatim("The <area> of a record of before.")
-    assert Locale("en").sentence(said) == "The <area> of a record of before."
-    assert Locale("de").sentence(said) == '<span lang="en">The &lt;area&gt; of a record of before.</span>'
+    message = verbatim("The <area> of a record of before.")
+    assert Locale("en").sentence(message) == "The <area> of a record of before."
+    assert Locale("de").sentence(message) == '<span lang="en">The &lt;area&gt; of a record of before.</span>'
 
 
 @pytest.mark.parametrize(
-    ("language", "message", "said"),
+    ("language", "message", "text"),
     [
         ("en", commands.BUSY(), "an inspection is under way: wait for its end"),
         ("de", commands.BUSY(), "eine Prüfung läuft: ihr Ende abwarten"),
@@ -105,16 +105,16 @@ def test_words_that_are_not_the_stations_are_marked_as_english_on_other_pages():
         ("de", outbox.WAITING(destination="mqtt", number=2, age_s=9.0), "mqtt: 2 Einträge warten, seit 9 s"),
     ],
 )  # fmt: skip
-def test_a_message_is_said_in_the_language_of_the_page(language, message, said):
-    assert Locale(language).sentence(message) == said
+def test_a_message_is_said_in_the_language_of_the_page(language, message, text):
+    assert Locale(language).sentence(message) == text
 
 
 @pytest.mark.parametrize("language", LANGUAGES[1:])
 def test_every_alarm_and_state_is_said_in_every_language(language):
-    told = translations(language)
+    translated = translations(language)
     for row in ALARMS.values():
-        assert {row.cause.id, row.consequence.id, row.action.id} <= told.keys()
-    assert {facts.reason.id for facts in STATES.values()} - {"text.sentences"} <= told.keys()
+        assert {row.cause.id, row.consequence.id, row.action.id} <= translated.keys()
+    assert {facts.reason.id for facts in STATES.values()} - {"text.sentences"} <= translated.keys()
 
 
 @pytest.mark.parametrize(
@@ -171,18 +171,18 @@ def test_every_part_is_somewhere():
 
 def test_every_page_is_looked_at_in_both_sizes():
     """By the tests that open each page of their list `PAGES`, and those of `IN_THEIR_OWN_TESTS`."""
-    looked_at = []
+    paths = []
     for test in ("hmi/test_every_page.py", "hmi_pages/test_every_page.py"):
         body = ast.parse((Path(__file__).parents[1] / test).read_text(encoding="utf-8")).body
         lists = [
             each.value for each in body if isinstance(each, ast.Assign) and ast.unparse(each.targets[0]) == "PAGES"
         ]
-        looked_at += [str(path).replace("SOFT", "7").replace("LAST", "7") for path in ast.literal_eval(lists[0])]
+        paths += [str(path).replace("SOFT", "7").replace("LAST", "7") for path in ast.literal_eval(lists[0])]
     for module in modules():
         for route in module.router.routes:
             page = "GET" in route.methods and not route.path.startswith("/api/")
             if page and route.path not in NO_PAGES | IN_THEIR_OWN_TESTS:
-                assert any(route.path_regex.fullmatch(path) for path in looked_at), route.path
+                assert any(route.path_regex.fullmatch(path) for path in paths), route.path
 
 
 @pytest.mark.parametrize(

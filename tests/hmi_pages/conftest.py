@@ -63,7 +63,7 @@ PEOPLE = {"Ada": Role.ADMIN, "Quin": Role.QUALITY, "Rosa": Role.QUALITY, "Max": 
 PIN = "735192"
 MEASURED = frozenset(list(Reason)[: list(Reason).index(Reason.REFERENCE_BAD)]) - {Reason.NO_CONTACT}
 """The reasons that the fruit itself gives, after some steps."""
-_KEPT: list[int] = []
+_LASTING: list[int] = []
 """Processes of the site, which all modules share."""
 T = TypeVar("T")
 eventually = functools.partial(poll, patience_s=PATIENCE_S)
@@ -107,8 +107,8 @@ class Site:
     def twin(self, **request: Any) -> Any:
         return ask("127.0.0.1", self.console, request)
 
-    def asked(self, work: Callable[[ChannelClient], Awaitable[T]], endpoint: str = "") -> T:
-        """Ask the station as the PLC interface does, or over another endpoint."""
+    def over_channel(self, work: Callable[[ChannelClient], Awaitable[T]], endpoint: str = "") -> T:
+        """Run requests to the station as the PLC interface does, or over another endpoint."""
         where = endpoint or line_endpoint(self.configuration.handshake, self.home)
 
         async def run() -> T:
@@ -119,14 +119,14 @@ class Site:
             return thread.submit(asyncio.run, run()).result()
 
     def over_the_panel(self, work: Callable[[ChannelClient], Awaitable[T]]) -> T:
-        return self.asked(work, panel_endpoint(self.configuration.hmi, self.home))
+        return self.over_channel(work, panel_endpoint(self.configuration.hmi, self.home))
 
     def state(self) -> StationState:
-        return self.asked(lambda client: client.request(LINE, StationState, deadline_s=20))
+        return self.over_channel(lambda client: client.request(LINE, StationState, deadline_s=20))
 
     def order(self, command: CommandName, argument: int = 0) -> CommandDone:
         request = Command(command=command, argument=argument)
-        return self.asked(lambda client: client.request(request, CommandDone, deadline_s=40))
+        return self.over_channel(lambda client: client.request(request, CommandDone, deadline_s=40))
 
     def ready(self) -> bool:
         """Return whether fruit is accepted; if not, reset as a person does: on a busy machine late moves stop it."""
@@ -143,14 +143,14 @@ class Site:
         async def steps(client: ChannelClient) -> Outcome:
             size = {"fruit_length_mm_x10": 480, "size_class": 3} if bruised else {}
             request = Begin(trigger_id=next(self._triggers), encoder=7, lot="LOT 1", **size)
-            begun = await client.request(request, BeginReply, deadline_s=20)
-            assert begun.sequence is not None, begun
-            outcome = await client.request(AwaitOutcome(sequence=begun.sequence), Outcome, deadline_s=PATIENCE_S)
+            reply = await client.request(request, BeginReply, deadline_s=20)
+            assert reply.sequence is not None, reply
+            outcome = await client.request(AwaitOutcome(sequence=reply.sequence), Outcome, deadline_s=PATIENCE_S)
             await client.request(Published(outcome=outcome), Noted, deadline_s=20)
             await client.request(Acknowledged(sequence=outcome.sequence), Noted, deadline_s=20)
             return outcome
 
-        outcome = self.asked(steps)
+        outcome = self.over_channel(steps)
         self.fruit.append(outcome)
         self.twin(do="remove")
         return outcome
@@ -164,7 +164,7 @@ class Site:
             assert self.order(CommandName.SET_MODE, 1).done
 
 
-def begun(command: list[str], is_ready: Callable[[str], bool], log: Path) -> subprocess.Popen[str]:
+def start_program(command: list[str], is_ready: Callable[[str], bool], log: Path) -> subprocess.Popen[str]:
     """A process of the station's command line, once one of its lines is the one that is waited for."""
     with log.open("w") as errors:
         process = subprocess.Popen(
@@ -179,7 +179,7 @@ def begun(command: list[str], is_ready: Callable[[str], bool], log: Path) -> sub
 
 @pytest.fixture(autouse=True)
 def nothing_left_behind() -> None:
-    """A browser begins threads and processes of its own when it likes: what is left is looked for after the module."""
+    """A browser begins threads and processes of its own when it likes: leftovers are checked after the module."""
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -194,7 +194,7 @@ def nothing_left_by_the_module() -> Iterator[None]:
     processes, threads = living()
     yield
     deadline_s = time.monotonic() + PATIENCE_S
-    while (left := (living()[0] - processes - set(_KEPT), living()[1] - threads)) != (set(), set()):
+    while (left := (living()[0] - processes - set(_LASTING), living()[1] - threads)) != (set(), set()):
         assert time.monotonic() < deadline_s, f"left behind: {left}"
         time.sleep(0.05)
 
@@ -242,15 +242,17 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     processes: list[subprocess.Popen[str]] = []
     try:
         arguments = ["--config", str(file)]
-        processes.append(begun(["twin", "--bench", "--console", "0", *arguments], twin_is_ready, folder / "twin.log"))
         processes.append(
-            begun(["service", *arguments], lambda line: line.startswith("running"), folder / "service.log")
+            start_program(["twin", "--bench", "--console", "0", *arguments], twin_is_ready, folder / "twin.log")
+        )
+        processes.append(
+            start_program(["service", *arguments], lambda line: line.startswith("running"), folder / "service.log")
         )
         with (folder / "others.log").open("w") as log:
             for name in (["hmi"], ["plc", "run"]):
                 command = [sys.executable, "-m", "station", *name, *arguments]
                 processes.append(subprocess.Popen(command, stdout=log, stderr=log, text=True))
-        _KEPT.extend(process.pid for process in processes)
+        _LASTING.extend(process.pid for process in processes)
         made = Site(load_configuration(file, {}), consoles[0], f"http://127.0.0.1:{port}")
         eventually(lambda: _answers(made.address) or _ended(processes, folder / "others.log"))
         made.twin(do="remove")
@@ -348,7 +350,7 @@ def token_of(site: Site) -> Callable[[str, Role], str]:
 
 @dataclass
 class Person:
-    """Somebody at a panel."""
+    """A person at a panel."""
 
     context: BrowserContext
     page: Page
@@ -371,7 +373,7 @@ class Person:
 
 @pytest.fixture
 def panel(site: Site, browser: Browser) -> Iterator[Callable[..., Person]]:
-    """Opens a browser of its own, 1280 x 800 by default; what it says in its console fails the test."""
+    """Opens a browser of its own, 1280 x 800 by default; what it writes to its console fails the test."""
     contexts: list[BrowserContext] = []
     complaints: list[str] = []
 
@@ -383,7 +385,7 @@ def panel(site: Site, browser: Browser) -> Iterator[Callable[..., Person]]:
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on(
             "console",
-            lambda told: complaints.append(told.text) if "Content Security Policy" in told.text else None,
+            lambda message: complaints.append(message.text) if "Content Security Policy" in message.text else None,
         )
         person = Person(context, page, site.address)
         if name:

@@ -1,4 +1,4 @@
-"""The HTTP API as a plant's system uses it, and as somebody who should not."""
+"""The HTTP API as a plant's system uses it, and as one that should not."""
 
 import re
 import time
@@ -61,7 +61,7 @@ def test_no_5xx_and_no_undocumented_answer(schema: Any, writing: str, method: st
     def check(case: Any) -> None:
         # Schemathesis escapes some paths' percent signs only: a lot "%EA" would arrive as a byte that is no UTF-8.
         case.path_parameters = {name: str(value).replace("%", "%25") for name, value in case.path_parameters.items()}
-        # What the schema says of a name's length it asks of the escaped one, which is longer than what arrives.
+        # The schema limits the length of the escaped name, which is longer than what arrives.
         assume(all(len(value) <= LONGEST_LOT for value in case.path_parameters.values() if "%" in value))
         case.call_and_validate(headers={"Authorization": f"Bearer {writing}"}, timeout=60)
 
@@ -99,9 +99,9 @@ def test_pages_of_results_neither_overlap_nor_leave_out(orchard: Any, api: Any, 
 def test_a_lot_is_begun_and_ended_and_the_trail_knows_by_whom(
     orchard: Any, api: Any, writing: str, token_of: Callable[[str, Role], str]
 ) -> None:
-    begun = api("PUT", "/api/v1/lots/L-7", token=writing, json_body={"grower": "Hof Süd"})
-    assert (begun.status, begun.body["grower"], begun.body["ended"]) == (200, "Hof Süd", None)
-    assert api("PUT", "/api/v1/lots/L-7", token=writing, json_body={"grower": "Hof Süd"}).body == begun.body
+    started = api("PUT", "/api/v1/lots/L-7", token=writing, json_body={"grower": "Hof Süd"})
+    assert (started.status, started.body["grower"], started.body["ended"]) == (200, "Hof Süd", None)
+    assert api("PUT", "/api/v1/lots/L-7", token=writing, json_body={"grower": "Hof Süd"}).body == started.body
     assert api("PUT", "/api/v1/lots/L-7", token=writing, json_body={"grower": "another"}).status == 409
     assert api("POST", "/api/v1/lots/L-7/end", token=writing).body["ended"] is not None
     assert api("GET", "/api/v1/lots/L-7", token=writing).body["ended"] is not None

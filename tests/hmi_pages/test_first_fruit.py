@@ -17,7 +17,7 @@ from playwright.sync_api import Browser, Page, expect
 from hmi.web.user_store import UserStore
 from station.records.database import FILE_NAME
 from tests.chromium import follow
-from tests.hmi_pages.conftest import PATIENCE_S, PATIENT_HANDSHAKE, PIN, Person, begun, quick_recipes
+from tests.hmi_pages.conftest import PATIENCE_S, PATIENT_HANDSHAKE, PIN, Person, quick_recipes, start_program
 from tests.hosts import fresh_host
 from tests.ports import free_port
 
@@ -56,7 +56,7 @@ class Fresh:
         self.processes: list[subprocess.Popen[str]] = []
 
     def begin(self, *command: str, ready: str) -> None:
-        """Start a part of the station, and wait until it says that it is ready."""
+        """Start a part of the station, and wait until it reports that it is ready."""
 
         def is_ready(line: str) -> bool:
             if line.startswith("console"):
@@ -64,10 +64,10 @@ class Fresh:
             return ready in line
 
         log = self.folder / f"{command[0]}.log"
-        self.processes.append(begun([*command, "--config", str(self.file)], is_ready, log))
+        self.processes.append(start_program([*command, "--config", str(self.file)], is_ready, log))
 
     def serve(self, *command: str) -> None:
-        """Start a part that says nothing on its standard output."""
+        """Start a part that writes nothing to its standard output."""
         with (self.folder / f"{command[0]}.log").open("w") as log:
             whole = [sys.executable, "-m", "station", *command, "--config", str(self.file)]
             self.processes.append(subprocess.Popen(whole, stdout=log, stderr=log, text=True))
@@ -150,7 +150,7 @@ def test_from_a_fresh_installation_to_the_first_fruit(fresh: Fresh, admin: Page)
     assert page.evaluate("document.activeElement.id") == "setup-plc-1", "the focus stays as the page follows"
     assert page.evaluate("document.body.dataset.same") == "yes", "all this without a reload"
     follow(page.locator("[data-step=gripper]").get_by_role("link", name="Run"))
-    follow(page.get_by_role("button", name="Start"))  # on a bench a person says that nothing is between the jaws
+    follow(page.get_by_role("button", name="Start"))  # on a bench a person confirms that nothing is between the jaws
     page.goto(address)
     state_of(page, "gripper", "Done")
     state_of(page, "plc", "Next")

@@ -44,18 +44,18 @@ def test_why_a_fruit_was_diverted_is_said_in_german(orchard: Any, panel: Any) ->
 def test_a_record_of_before_messages_is_shown_in_english_and_marked(
     orchard: Any, panel: Any, api: Any, token_of: Any
 ) -> None:
-    told, number = "The area at 3 mm of closing was over the limit.", orchard.fruit[0].sequence
+    text, number = "The area at 3 mm of closing was over the limit.", orchard.fruit[0].sequence
     database = sqlite3.connect(records_folder(orchard.home) / FILE_NAME, timeout=60)
     (before,) = database.execute("SELECT explanation FROM inspections WHERE sequence = ?", (number,)).fetchone()
     change = "UPDATE inspections SET explanation = ? WHERE sequence = ?"
     try:
         with database:
-            database.execute(change, (json.dumps([told]), number))
+            database.execute(change, (json.dumps([text]), number))
         page = panel("", locale="de").go(f"/history/{number}")
-        expect(page.locator("section[aria-labelledby=why] p [lang=en]")).to_have_text(told)
+        expect(page.locator("section[aria-labelledby=why] p [lang=en]")).to_have_text(text)
         whole = api("GET", f"/api/v1/inspections/{number}", token=token_of("before", Role.VIEWER)).body
-        assert whole["explanation"] == [told]
-        assert whole["messages"] == [{"id": "text.verbatim", "parameters": {"text": told}, "text": told}]
+        assert whole["explanation"] == [text]
+        assert whole["messages"] == [{"id": "text.verbatim", "parameters": {"text": text}, "text": text}]
     finally:
         with database:
             database.execute(change, (before, number))
@@ -199,7 +199,7 @@ def test_a_finger_on_the_page_at_a_jobs_end_does_not_keep_the_end_from_being_sho
     part.hover()
     page.mouse.down()
     page.unroute("**/jobs/*/part**")
-    for _ in range(2):  # the page asks for the second one when it has taken the first
+    for _ in range(2):  # the page requests the second one when it has taken the first
         with page.expect_response(lambda answer: answer.headers.get("x-over") == "1"):
             pass
     expect(part).to_contain_text("In progress")

@@ -26,7 +26,7 @@ def audited(site: Any, action: str) -> list[Any]:
 
 
 def holding(page: Page, address: str) -> list[Any]:
-    """Keeps what a page asks for from being answered; gives what was asked."""
+    """Keeps a page's requests from being answered; returns the requests."""
     held: list[Any] = []
 
     def hold(route: Any) -> None:
@@ -54,19 +54,19 @@ def test_jogging_is_refused_out_of_manual_mode_and_done_in_it(
     expect(page.get_by_role("button", name="Back to production")).to_be_visible()
     page.get_by_label("To the width, mm").fill("40,4")
     follow(page.get_by_role("button", name="Move", exact=True))
-    told = page.get_by_text(re.compile(r"The fingers are at [\d.]+ mm"))
-    expect(told).to_be_visible()
-    width_mm = float(re.findall(r"[\d.]+", told.inner_text())[0])
+    fingers = page.get_by_text(re.compile(r"The fingers are at [\d.]+ mm"))
+    expect(fingers).to_be_visible()
+    width_mm = float(re.findall(r"[\d.]+", fingers.inner_text())[0])
     assert abs(width_mm - 40.4) < 0.3
     assert not orchard.state().ready
     expect(page.locator("[data-poll] .big")).to_have_text(f"{width_mm:.1f} mm")
     follow(page.get_by_role("button", name="+ 1 mm"))
-    expect(told).not_to_contain_text(f"{width_mm:.1f}")
-    wider_mm = float(re.findall(r"[\d.]+", told.inner_text())[0])
+    expect(fingers).not_to_contain_text(f"{width_mm:.1f}")
+    wider_mm = float(re.findall(r"[\d.]+", fingers.inner_text())[0])
     assert 0.5 < wider_mm - width_mm < 1.5
     width_mm = wider_mm
     follow(page.get_by_role("button", name="Open", exact=True))
-    expect(told).not_to_contain_text(f"{width_mm:.1f}")
+    expect(fingers).not_to_contain_text(f"{width_mm:.1f}")
     follow(page.get_by_role("button", name="Back to production"))
     expect(page.get_by_role("button", name="Set manual mode")).to_be_visible()
     assert orchard.state().mode == 1
@@ -87,14 +87,14 @@ def test_the_live_image_goes_on_and_registers_are_told_by_name(orchard: Any, pan
 
 def test_a_live_image_is_asked_for_no_faster_than_the_browser_takes_it(orchard: Any, panel: Any) -> None:
     page = panel().go("/maintenance/image")
-    asked: list[str] = []
+    requested: list[str] = []
     held = holding(page, "**/maintenance/image/*.jpg")
-    page.on("request", lambda request: asked.append(request.url) if "/image/part" in request.url else None)
+    page.on("request", lambda request: requested.append(request.url) if "/image/part" in request.url else None)
     while not held:
         page.wait_for_timeout(50)
-    before = len(asked)
+    before = len(requested)
     page.wait_for_timeout(1500)  # seven times the pause between two
-    assert (len(asked), len(held)) == (before, 1), "the next is not asked for before this one was taken"
+    assert (len(requested), len(held)) == (before, 1), "the next is not requested before this one was taken"
     page.unroute("**/maintenance/image/*.jpg")  # which lets it go on
     with page.expect_request("**/maintenance/image/part*"):
         pass

@@ -64,9 +64,9 @@ def test_a_draft_is_written_shown_on_past_curves_rejected_and_another_approved(o
     assert ("Rosa", "quality", "recipe.approved") in done
     assert ("Rosa", "quality", "recipe.retired") in done
     assert ("Quin", "quality", "recipe.submitted") in done
-    told = rosa.go("/recipes/strawberry/history").locator("main").inner_text()
-    assert "too strict" in told
-    assert "seen on the curves" in told
+    text = rosa.go("/recipes/strawberry/history").locator("main").inner_text()
+    assert "too strict" in text
+    assert "seen on the curves" in text
 
 
 def test_a_slider_moves_the_limit_and_the_limit_moves_the_slider(panel: Any) -> None:

@@ -49,7 +49,7 @@ class Station:
         self.pages.context.gateway.state = now
 
     def answer(self, route: Route, language: Language) -> None:
-        """Answer a browser's request; the stream has one event, and is asked for again."""
+        """Answer a browser's request; the stream has one event, and is requested again."""
         self.pages.context.gateway.heard_s = time.monotonic()
         path = "/" + route.request.url.split("/", 3)[3]
         if not path.startswith("/live"):

@@ -26,10 +26,10 @@ WAIT = "import sys, time, pathlib; pathlib.Path(sys.argv[1], 'begun').touch(); t
 
 async def until(jobs: Jobs, job: str, wanted: Callable[[Job], Any]) -> Job:
     deadline_s = time.monotonic() + PATIENCE_S
-    while not wanted(told := jobs.get(job)):
-        assert time.monotonic() < deadline_s, told
+    while not wanted(known := jobs.get(job)):
+        assert time.monotonic() < deadline_s, known
         await asyncio.sleep(0.02)
-    return told
+    return known
 
 
 def with_jobs(home: Path, code: str, work: Callable[[Jobs], Any]) -> None:
@@ -47,10 +47,10 @@ def test_a_jobs_file_is_named_with_its_place_and_no_other_is(tmp_path: Path) -> 
     async def work(jobs: Jobs) -> None:
         folder = jobs.folder()
         job = jobs.begin("export", folder, [str(folder)]).id
-        told = await until(jobs, job, lambda told: told.state == "done")
-        assert [(file.path.name, file.size_bytes) for file in told.files] == [("inspections.csv", 5_000_000)]
+        known = await until(jobs, job, lambda known: known.state == "done")
+        assert [(file.path.name, file.size_bytes) for file in known.files] == [("inspections.csv", 5_000_000)]
         (folder / "secret").write_text("x")
-        assert [file.path for file in told.files] == [folder / "inspections.csv"]
+        assert [file.path for file in known.files] == [folder / "inspections.csv"]
 
     with_jobs(tmp_path, WRITE, work)
 
@@ -58,9 +58,9 @@ def test_a_jobs_file_is_named_with_its_place_and_no_other_is(tmp_path: Path) -> 
 def test_a_job_that_fails_tells_its_last_words_and_leaves_nothing(tmp_path: Path) -> None:
     async def work(jobs: Jobs) -> None:
         folder = jobs.folder()
-        told = await until(jobs, jobs.begin("export", folder, [str(folder)]).id, lambda told: told.state == "failed")
-        assert str(told.message) == "the disk is full"
-        assert told.files == ()
+        known = await until(jobs, jobs.begin("export", folder, [str(folder)]).id, lambda known: known.state == "failed")
+        assert str(known.message) == "the disk is full"
+        assert known.files == ()
         assert not folder.exists()
 
     with_jobs(tmp_path, FAIL, work)
@@ -71,15 +71,15 @@ def test_a_job_called_off_ends_its_process_and_too_many_are_refused(tmp_path: Pa
 
     async def work(jobs: Jobs) -> None:
         folders = []
-        begun = []
+        started = []
         for _ in range(MOST_WAITING):
             folders.append(jobs.folder())
-            begun.append(jobs.begin("export", folders[-1], [str(folders[-1])]).id)
+            started.append(jobs.begin("export", folders[-1], [str(folders[-1])]).id)
         with pytest.raises(JobError):
             jobs.folder()
-        await until(jobs, begun[0], lambda _: (folders[0] / "begun").exists())
+        await until(jobs, started[0], lambda _: (folders[0] / "begun").exists())
         assert set(psutil.Process().children()) - before
-        for job in begun:
+        for job in started:
             await jobs.end(job)
             assert jobs.get(job).state == "ended"
         assert not set(psutil.Process().children()) - before
@@ -101,12 +101,12 @@ def test_the_worker_refuses_more_than_it_can_hold() -> None:
     async def run() -> None:
         worker, going = PanelWorker(), threading.Event()
         try:
-            asked = [asyncio.create_task(worker.do(lambda: going.wait(PATIENCE_S))) for _ in range(MOST_QUESTIONS)]
+            tasks = [asyncio.create_task(worker.do(lambda: going.wait(PATIENCE_S))) for _ in range(MOST_QUESTIONS)]
             await asyncio.sleep(0)
             with pytest.raises(PanelBusyError):
                 await worker.do(lambda: None)
             going.set()
-            assert await asyncio.gather(*asked) == [True] * MOST_QUESTIONS
+            assert await asyncio.gather(*tasks) == [True] * MOST_QUESTIONS
             assert await worker.do(lambda: 7) == 7
         finally:
             going.set()
@@ -116,17 +116,17 @@ def test_the_worker_refuses_more_than_it_can_hold() -> None:
 
 
 def test_recipes_shipped_are_not_edited_and_it_is_said_where_they_lie(tmp_path: Path) -> None:
-    async def told(folder: Path | None) -> RecipeList:
+    async def read(folder: Path | None) -> RecipeList:
         worker = PastWorker()
         try:
             return await PastRecipes(tmp_path, folder, worker).read()
         finally:
             worker.close()
 
-    shipped = asyncio.run(told(None))
+    shipped = asyncio.run(read(None))
     assert not shipped.editable
     assert set(load_recipes(shipped.folder)) == {state.name for state in shipped.states} == set(load_recipes())
     own = tmp_path / "recipes"
     assert shipped.own_folder == own
     own.mkdir()
-    assert asyncio.run(told(own)).editable
+    assert asyncio.run(read(own)).editable

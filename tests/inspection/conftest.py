@@ -22,7 +22,7 @@ class World:
     """Known to be open, and nothing has closed them since."""
     stopped_for_a_person: bool = False
     hold: Event | None = None
-    """Kept for the next start."""
+    """Stored for the next start."""
     accepted: int = 0
     """Triggers accepted and not answered with an outcome."""
     recorded: bool = False

@@ -41,7 +41,7 @@ def test_every_alarm_asks_for_an_action_and_has_a_bit_of_its_own():
 
 def test_the_cycle_raises_alarms_that_a_person_must_end_only_where_one_is_needed():
     raised = {action.alarm for t in TABLE.values() for action in t.actions if isinstance(action, Raise)}
-    of_devices = {AlarmId.ARM_NOT_REMOTE}  # a stop on the pendant has local control's, which is kept, not latched
+    of_devices = {AlarmId.ARM_NOT_REMOTE}  # a stop on the pendant has local control's, which stays active, not latched
     assert {alarm for alarm, row in ALARMS.items() if row.latched} == raised - {AlarmId.DEADLINE_MISSED} - of_devices
 
 
@@ -176,11 +176,11 @@ def test_what_stands_is_never_forgotten_and_what_is_over_ends(steps):
         assert alarms.get(alarm).state in CAUSED
     for alarm in set(AlarmId) - causes:
         alarms = alarms.returned(alarm, now)
-    quiet = alarms.tick(now + LONGEST_SHELVED_S + CHATTER_S)
+    later = alarms.tick(now + LONGEST_SHELVED_S + CHATTER_S)
     for alarm in set(AlarmId) - causes:
-        assert quiet.get(alarm).state not in CAUSED
-        assert quiet.get(alarm).state not in SHELVES
-    ended = quiet
+        assert later.get(alarm).state not in CAUSED
+        assert later.get(alarm).state not in SHELVES
+    ended = later
     for alarm in AlarmId:
         ended = ended.returned(alarm, 1e9).tick(2e9).acknowledge(alarm).reset(alarm)
     assert ended.tick(3e9).known == {}

@@ -80,7 +80,7 @@ def test_from_everywhere_there_is_a_way_back_to_ready(cycle_model):
 
 
 def backwards(model, goals, without):
-    """The worlds from which a goal is reached by events alone: a crash helps nobody."""
+    """The worlds from which a goal is reached by events alone: a crash does not count."""
     before = {}
     for world, events in model.items():
         for event, following in events.items():
@@ -95,7 +95,7 @@ def backwards(model, goals, without):
 
 
 def waits_for_a_person(world):
-    """A safety stop stands, or the state itself says that only a person leads on."""
+    """A safety stop is active, or by the state itself only a person leads on."""
     return world.stopped_for_a_person or STATES[world.state].needs_person
 
 
@@ -178,8 +178,8 @@ AGAIN = [
 
 
 def test_a_fruit_is_centred_and_looked_at_again_within_one_inspection():
-    cycle, begun = Cycle(), GOOD.index(Event.ONSET_FOUND)
-    actions = [action for event in (*GOOD[:begun], *AGAIN, *GOOD[begun:]) for action in cycle.on(event) or ()]
+    cycle, onset = Cycle(), GOOD.index(Event.ONSET_FOUND)
+    actions = [action for event in (*GOOD[:onset], *AGAIN, *GOOD[onset:]) for action in cycle.on(event) or ()]
     assert (cycle.state, cycle.refused) == (State.IDLE, Counter())
     counted = Counter(actions)
     assert counted[Action.CLOSE_TO_ONSET] == 3

@@ -24,8 +24,8 @@ def test_the_drawing_shows_every_state_and_event_apart_from_the_disturbances():
     words = " ".join(element.text or "" for element in ET.fromstring(diagram()).iter())
     for state in State:
         assert state.value.replace("_", " ") in words
-    told = {event for (state, event), t in TABLE.items() if t.state != state} - DISTURBED
-    for event in told:
+    drawn = {event for (state, event), t in TABLE.items() if t.state != state} - DISTURBED
+    for event in drawn:
         assert event.value.replace("_", " ") in words, event
 
 

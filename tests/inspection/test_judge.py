@@ -147,7 +147,7 @@ def test_an_area_about_its_limit_neither_passes_nor_fails(area, reason):
 
 
 @pytest.mark.parametrize(
-    ("flag", "reason", "said"),
+    ("flag", "reason", "message"),
     [
         (Flag.NO_CONTACT, Reason.CONTACT_LOST, messages.CONTACT_LOST),
         (Flag.UNDECIDED, Reason.LOW_CONFIDENCE, messages.NO_EDGE),
@@ -156,10 +156,10 @@ def test_an_area_about_its_limit_neither_passes_nor_fails(area, reason):
         (Flag.REFERENCE_MISMATCH, Reason.REFERENCE_BAD, messages.REFERENCE_MISMATCH),
     ],
 )
-def test_a_step_that_is_not_trusted_is_no_pass(flag, reason, said):
+def test_a_step_that_is_not_trusted_is_no_pass(flag, reason, message):
     verdict = judge(spoilt(pressed(20), 3.0, flag), STRAWBERRY)
     assert (verdict.outcome, verdict.reasons) == ("NO_RESULT", (reason,))
-    assert verdict.findings[0].message == said(closings=[messages.CLOSING(closing_mm=3.0)])
+    assert verdict.findings[0].message == message(closings=[messages.CLOSING(closing_mm=3.0)])
     # Beyond the last damage threshold, and on a light touch, it is no criterion.
     for closing in (1.0, 9.0):
         assert judge(spoilt(pressed(15), closing, flag), STRAWBERRY).outcome == "PASS"
@@ -198,9 +198,9 @@ def test_it_does_not_where_it_may_be_over_the_limit_itself_or_the_onset_was_too_
 def test_a_confidence_that_is_low_or_unknown_is_no_pass(confidence):
     verdict = judge(spoilt(pressed(20), 4.0, confidence=confidence), STRAWBERRY)
     assert (verdict.outcome, verdict.reasons) == ("NO_RESULT", (Reason.LOW_CONFIDENCE,))
-    said = verdict.findings[0].message
-    assert said.id == (messages.NO_CONFIDENCE if confidence is None else messages.LOW_CONFIDENCE).id
-    assert (said.parameters.get("confidence"), said.parameters["least"]) == (confidence, 0.5)
+    message = verdict.findings[0].message
+    assert message.id == (messages.NO_CONFIDENCE if confidence is None else messages.LOW_CONFIDENCE).id
+    assert (message.parameters.get("confidence"), message.parameters["least"]) == (confidence, 0.5)
 
 
 def test_a_contact_cut_by_the_border_is_a_lower_bound():
@@ -296,8 +296,8 @@ def test_nothing_touched_and_a_wrong_fruit():
         wrong = judge(pressed(48, onset_mm=width), STRAWBERRY)
         assert wrong.outcome == "NO_RESULT"
         assert Reason.OUT_OF_RANGE in wrong.reasons
-        said = messages.WRONG_WIDTH(width_mm=width, recipe="Strawberry", smallest_mm=22.0, largest_mm=53.0)
-        assert said in [finding.message for finding in wrong.findings]
+        message = messages.WRONG_WIDTH(width_mm=width, recipe="Strawberry", smallest_mm=22.0, largest_mm=53.0)
+        assert message in [finding.message for finding in wrong.findings]
 
 
 @pytest.mark.parametrize("reason", [Reason.LATE, Reason.CALLED_OFF, Reason.CAMERA_FAULT, Reason.REFERENCE_BAD])
@@ -440,7 +440,7 @@ def test_the_unit_of_the_areas_does_not_matter(press, recipe, factor):
 
 
 NO_LIMIT = {messages.STOPPED_UNTRUSTED.id}
-"""Of a press that is not trusted, whatever its value."""
+"""Of a press that is not trusted, with any value."""
 
 
 @given(PRESSES, RECIPES)
@@ -450,11 +450,11 @@ def test_every_verdict_explains_itself(press, recipe):
     if verdict.outcome == "FAIL":
         assert any(finding.proves for finding in verdict.findings)
     for finding in verdict.findings:
-        said = str(finding.message)
-        assert said[0].isupper()
-        assert said.endswith(".")
+        text = str(finding.message)
+        assert text[0].isupper()
+        assert text.endswith(".")
         if finding.limit is not None and finding.value is not None and finding.message.id not in NO_LIMIT:
-            assert any(f"{finding.limit:{form}}" in said for form in ("g", ".1f"))
+            assert any(f"{finding.limit:{form}}" in text for form in ("g", ".1f"))
     assert early_stop(press, recipe) == verdict.stopped
 
 
@@ -567,7 +567,7 @@ def test_a_doubtful_onset_does_not_press_a_fruit_on_to_the_early_stop():
     stop = early_stop(late(4), DECIDING)
     assert stop is not None
     assert stop.message.id == messages.STOPPED_CANNOT_PASS.id
-    # An excused step may hide where the onset was; one more step tells, and a third tells nothing new.
+    # An excused step may hide where the onset was; one more step shows it, and a third shows nothing new.
     hides = {"confidence": 0.1, "area_mm2": 60.0}
     assert early_stop(late(5, **hides), DECIDING) is not None
 
@@ -617,7 +617,7 @@ EVERY_TRUSTED = FIRST_TRUSTED.model_copy(
 
 
 def every_trusted(at_2_mm2: float, at_4_mm2: float, doubtful_mm: tuple[float, ...], flag: Flag) -> Press:
-    """A strawberry pressed by the same limits, each of which has to be kept where its area is trusted."""
+    """A strawberry pressed by the same limits, each of which has to be met where its area is trusted."""
     press = Press(35.0, 0.4, ())
     areas_mm2 = (0.0, at_2_mm2 / 2, at_2_mm2, (at_2_mm2 + at_4_mm2) / 2, at_4_mm2, 1.25 * at_4_mm2)
     for closing, area_mm2 in enumerate(areas_mm2):

@@ -82,32 +82,32 @@ def longest(areas: list[float], floors: dict[int, float], places: list[int], mos
 
 
 def plainly(widths: list[float], areas: list[float], relative: float, least: float) -> list[WrongFrame]:
-    """The definition written out, without a thought for its cost: a frame is kept if a longest run goes on before it.
+    """The definition written out, not made fast: a frame is consistent if a longest run goes on before it.
 
     The last one is the latest such frame, and each before it the earliest.
     """
     closing = [place for place, width in enumerate(widths) if all(width < earlier for earlier in widths[:place])]
     slack = {place: max(least, relative * areas[place]) for place in closing}
     floors = {place: areas[place] - slack[place] for place in closing}
-    kept, most = list[int](), float("inf")
+    consistent, most = list[int](), float("inf")
     for length in reversed(range(longest(areas, floors, closing, most))):
-        before = [place for place in closing if not kept or place < kept[0]]
+        before = [place for place in closing if not consistent or place < consistent[0]]
         fitting = [
             place
             for number, place in enumerate(before)
             if floors[place] <= most and longest(areas, floors, before[:number], min(most, areas[place])) >= length
         ]
-        kept.insert(0, fitting[0] if kept else fitting[-1])
-        most = min(most, areas[kept[0]])
+        consistent.insert(0, fitting[0] if consistent else fitting[-1])
+        most = min(most, areas[consistent[0]])
     return [
         WrongFrame(
             place,
             areas[place],
-            max((areas[k] - slack[k] for k in kept if k < place), default=0.0),
-            min((areas[k] + slack[k] for k in kept if k > place), default=float("inf")),
+            max((areas[k] - slack[k] for k in consistent if k < place), default=0.0),
+            min((areas[k] + slack[k] for k in consistent if k > place), default=float("inf")),
         )
         for place in closing
-        if place not in kept
+        if place not in consistent
     ]
 
 
@@ -140,6 +140,6 @@ def test_no_other_frames_of_the_same_number_or_fewer_would_be_enough_or_come_fir
         return len(places), *places[-1:], *(-place for place in places[-2::-1])
 
     every = (places for number in range(len(areas) + 1) for places in combinations(range(len(areas)), number))
-    kept = max(filter(fit, every), key=order)
+    consistent = max(filter(fit, every), key=order)
     named = [frame.index for frame in wrong_frames([50.0 - step for step in range(len(areas))], areas, relative, least)]
-    assert named == [place for place in range(len(areas)) if place not in kept]
+    assert named == [place for place in range(len(areas)) if place not in consistent]

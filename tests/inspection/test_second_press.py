@@ -1,4 +1,4 @@
-"""The second press: when it is made, and what two presses on one fruit say together."""
+"""The second press: when it is made, and the verdict of two presses on one fruit together."""
 
 from dataclasses import replace
 from pathlib import Path

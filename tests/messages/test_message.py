@@ -30,13 +30,13 @@ def test_a_message_is_its_english_sentence_as_text() -> None:
 
 
 def test_a_message_encloses_others() -> None:
-    said = ENCLOSING(first=WIDE(what="it", width_mm=1), others=[SEVERAL(number=1), SEVERAL(number=2)])
-    assert str(said) == "it is 1.0 mm wide; also 1 fruit and 2 fruits."
+    message = ENCLOSING(first=WIDE(what="it", width_mm=1), others=[SEVERAL(number=1), SEVERAL(number=2)])
+    assert str(message) == "it is 1.0 mm wide; also 1 fruit and 2 fruits."
 
 
 def test_a_message_survives_json() -> None:
-    said = ENCLOSING(first=WIDE(what="it", width_mm=1), others=[SEVERAL(number=1), SEVERAL(number=2)])
-    assert Message.model_validate_json(said.model_dump_json()) == said
+    message = ENCLOSING(first=WIDE(what="it", width_mm=1), others=[SEVERAL(number=1), SEVERAL(number=2)])
+    assert Message.model_validate_json(message.model_dump_json()) == message
 
 
 @pytest.mark.parametrize(
@@ -74,22 +74,22 @@ def test_a_parameter_whose_kind_is_left_out_is_a_name():
 
 
 def test_an_error_carries_its_message() -> None:
-    said = WIDE(what="it", width_mm=1)
-    assert message_of(StationError(said)) == said
-    assert str(StationError(said)) == "it is 1.0 mm wide"
+    message = WIDE(what="it", width_mm=1)
+    assert message_of(StationError(message)) == message
+    assert str(StationError(message)) == "it is 1.0 mm wide"
     assert message_of(OSError(2, "no such file")) == verbatim("[Errno 2] no such file")
 
 
 def test_a_text_field_holds_a_message_or_the_words_of_before() -> None:
-    said = WIDE(what="it", width_mm=1)
-    assert message_in(text_of(said)) == said
+    message = WIDE(what="it", width_mm=1)
+    assert message_in(text_of(message)) == message
     assert message_in("2 GB left") == verbatim("2 GB left")
     assert (message_in(""), text_of(None)) == (None, "")
 
 
 def test_a_message_gives_its_ids_and_those_that_it_encloses() -> None:
-    said = ENCLOSING(first=WIDE(what="it", width_mm=1), others=[SEVERAL(number=1)])
-    assert list(said.ids()) == ["test.enclosing", "test.wide", "test.several"]
+    message = ENCLOSING(first=WIDE(what="it", width_mm=1), others=[SEVERAL(number=1)])
+    assert list(message.ids()) == ["test.enclosing", "test.wide", "test.several"]
 
 
 def test_every_definition_can_be_written() -> None:

@@ -10,21 +10,33 @@ SOURCES = [
     for path in sorted((ROOT / room).rglob("*.py"))
     if ROOT / "station" / "messages" not in path.parents
 ]
-SAID = {"cause", "detail", "error", "explanation", "fault", "message", "reason", "remedy", "sentence", "trouble", "why"}
-"""Names of what the station says."""
+MESSAGE_NAMES = {
+    "cause",
+    "detail",
+    "error",
+    "explanation",
+    "fault",
+    "message",
+    "reason",
+    "remedy",
+    "sentence",
+    "trouble",
+    "why",
+}
+"""Names of the station's messages."""
 TEXT_METHODS = {
     "endswith", "find", "index", "partition", "removeprefix", "removesuffix", "rpartition", "split", "startswith",
 }  # fmt: skip
 
 
 def is_sentence(node):
-    """Return whether an expression is a sentence of ours: a name in `SAID`, or a call on one."""
+    """Return whether an expression is a sentence of ours: a name in `MESSAGE_NAMES`, or a call on one."""
     if isinstance(node, ast.Call):
         if isinstance(node.func, ast.Name) and node.func.id == "str" and node.args:
             return is_sentence(node.args[0])
         return isinstance(node.func, ast.Attribute) and is_sentence(node.func.value)
     name = node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
-    return name in SAID
+    return name in MESSAGE_NAMES
 
 
 def words(node):

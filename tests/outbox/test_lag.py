@@ -1,4 +1,4 @@
-"""The alarm for other systems that are not told in time: raised by a PostgreSQL that is away, gone when it is back."""
+"""The alarm for other systems that lag behind: raised by a PostgreSQL that is away, gone when it is back."""
 
 import asyncio
 import json
@@ -30,7 +30,7 @@ def ids(message):
 
 @pytest.fixture
 def site(tmp_path):
-    """The configuration of a station that tells a PostgreSQL; nobody is at its devices' addresses."""
+    """The configuration of a station that publishes to a PostgreSQL; no device is at its devices' addresses."""
 
     def make(host="/nowhere", **outbox):
         postgresql = {"enabled": True, "host": str(host), "user": "fruit", "tls": "disable"}
@@ -54,7 +54,7 @@ def test_a_postgresql_that_is_away_is_an_alarm_until_it_was_told_all(server, sit
     configuration = site(server.folder, alarm_after_rows=30)
     station = Station(configuration)
 
-    def told():
+    def alarm():
         assert station.service is not None
         return station.service.alarms.alarms.get(AlarmId.OUTBOX_BEHIND)
 
@@ -62,26 +62,26 @@ def test_a_postgresql_that_is_away_is_an_alarm_until_it_was_told_all(server, sit
         started = asyncio.Event()
         running = asyncio.create_task(station.run(lambda _port: started.set()))
         await asyncio.wait({running, asyncio.create_task(started.wait())}, return_when=asyncio.FIRST_COMPLETED)
-        telling = asyncio.create_task(run_outbox(configuration.outbox, configuration.home))
+        publishing = asyncio.create_task(run_outbox(configuration.outbox, configuration.home))
         try:
             status = outbox_folder(configuration.home) / "status.json"
             await until(lambda: status.exists() and '"connected":true' in status.read_text(), LIMIT_S)
-            assert told().state == "normal"
+            assert alarm().state == "normal"
             await asyncio.to_thread(server.stop, "fast")
             entries = [AuditEntry("ada", "quality", "tried", f"thing {number}") for number in range(40)]
             assert station.service is not None
             await station.service.registry.records.audit(*entries)
-            await until(lambda: told().state == "unacknowledged", LIMIT_S)
-            assert "postgresql: 4" in str(told().detail)
-            assert "entries wait, for " in str(told().detail)
+            await until(lambda: alarm().state == "unacknowledged", LIMIT_S)
+            assert "postgresql: 4" in str(alarm().detail)
+            assert "entries wait, for " in str(alarm().detail)
             await asyncio.to_thread(server.start)
-            await until(lambda: told().state == "returned", LIMIT_S)
+            await until(lambda: alarm().state == "returned", LIMIT_S)
         finally:
             if not (server.folder / "data" / "postmaster.pid").exists():  # other tests use it too
                 await asyncio.to_thread(server.start)
-            telling.cancel()
+            publishing.cancel()
             station.stop()
-            await asyncio.gather(telling, running, return_exceptions=True)
+            await asyncio.gather(publishing, running, return_exceptions=True)
 
     asyncio.run(scenario())
 
@@ -96,8 +96,8 @@ def test_what_is_behind_by_its_age_or_for_an_unknown_time_is_said_and_what_is_in
         write_status(outbox_folder(home), {"postgresql": DestinationStatus(**dict[str, Any]({**usual, **values}))})
         return of.alarm_detail()
 
-    assert of.alarm_detail() is None, "it has just begun"
-    assert trouble(away_since_utc_ms=now_ms - 3_600_000) is None, "away, and nothing to tell"
+    assert of.alarm_detail() is None, "it has just started"
+    assert trouble(away_since_utc_ms=now_ms - 3_600_000) is None, "away, and nothing to publish"
     assert trouble(waiting=3, oldest_utc_ms=now_ms - 30_000) is None
     assert messages.WAITING.id in ids(trouble(waiting=3, oldest_utc_ms=now_ms - 90_000))
     unknown = trouble(waiting=None, away_since_utc_ms=now_ms - 90_000)

@@ -54,31 +54,31 @@ def test_events_are_published_in_order_and_none_is_missing_after_the_broker_was_
     fill(records, 1, 3, steps=1)
 
     async def steps():
-        teller = Publisher(records, "line-7", mqtt, longest_pause_s=0.5)
-        telling = asyncio.create_task(teller.run())
+        publisher = Publisher(records, "line-7", mqtt, longest_pause_s=0.5)
+        publishing = asyncio.create_task(publisher.run())
         try:
-            await until(lambda: teller.status().waiting == 0, LIMIT_S)  # what was there before is no news
+            await until(lambda: publisher.status().waiting == 0, LIMIT_S)  # what was there before is no news
             heard = []
             listening = asyncio.create_task(hear(broker, set(range(4, 61)), heard))
             await until(lambda: ("fruit/line-7/online", True) in heard, LIMIT_S)
             await asyncio.to_thread(fill, records, 4, 20, 1)
-            await until(lambda: len(heard) > 10 and teller.status().waiting == 0, LIMIT_S)
+            await until(lambda: len(heard) > 10 and publisher.status().waiting == 0, LIMIT_S)
             broker.stop()
-            await until(lambda: not teller.status().connected, LIMIT_S)
+            await until(lambda: not publisher.status().connected, LIMIT_S)
             await asyncio.to_thread(fill, records, 21, 60, 1)
             broker.start()
             await listening
         finally:
-            telling.cancel()
-            await asyncio.gather(telling, return_exceptions=True)
-        told = [data for topic, data in heard if topic == "fruit/line-7/inspection"]
-        first = list(dict.fromkeys(data["sequence"] for data in told))
+            publishing.cancel()
+            await asyncio.gather(publishing, return_exceptions=True)
+        inspections = [data for topic, data in heard if topic == "fruit/line-7/inspection"]
+        first = list(dict.fromkeys(data["sequence"] for data in inspections))
         assert first == list(range(4, 61)), "each in order when it is heard first"
-        by_id = {data["id"]: data["sequence"] for data in told}
+        by_id = {data["id"]: data["sequence"] for data in inspections}
         assert len(by_id) == 57, "one heard twice has the same id both times"
-        assert told[0]["outcome"] in {"PASS", "FAIL", "NO_RESULT"}
-        assert told[0]["curve"][0]["width_mm"] == 30.0
-        assert told[0]["began"] == "2026-01-01T00:00:12.000+00:00"
+        assert inspections[0]["outcome"] in {"PASS", "FAIL", "NO_RESULT"}
+        assert inspections[0]["curve"][0]["width_mm"] == 30.0
+        assert inspections[0]["began"] == "2026-01-01T00:00:12.000+00:00"
 
     asyncio.run(steps())
 
@@ -90,9 +90,9 @@ def test_a_wrong_password_is_said_without_it(broker, mqtt, caplog):
         async with mqtt.connected():
             pass
 
-    with caplog.at_level(logging.DEBUG), pytest.raises(OutboxError, match=r"(?i)not authori[sz]ed") as told:
+    with caplog.at_level(logging.DEBUG), pytest.raises(OutboxError, match=r"(?i)not authori[sz]ed") as caught:
         asyncio.run(steps())
-    assert "quite wrong" not in str(told.value) + caplog.text
+    assert "quite wrong" not in str(caught.value) + caplog.text
 
 
 def test_a_password_that_others_can_read_is_refused(broker, mqtt):
@@ -121,7 +121,7 @@ def test_after_a_loss_of_the_records_and_a_restore_no_history_is_published_again
 
     async def steps():
         assert await publish(lineage(("A", None), last=5000)) == 5000, "history is not published at the first start"
-        assert await publish(lineage(("X", None), last=40)) == 0, "begun anew after a loss: nothing of it is omitted"
+        assert await publish(lineage(("X", None), last=40)) == 0, "started anew after a loss: nothing of it is omitted"
         restored = lineage(("C", None), ("A", 4000), last=4001)
         assert await publish(restored) == 4000, "a backup of the lost records, which were published up to here"
         assert await publish(lineage(("C", None), ("A", 4000), last=4010)) == 4001

@@ -1,4 +1,4 @@
-"""Rows reach a real PostgreSQL once each and in order, whatever becomes of it meanwhile."""
+"""Rows reach a real PostgreSQL once each and in order, whether it is cut off, crashed or stopped meanwhile."""
 
 import asyncio
 import json
@@ -44,15 +44,15 @@ def rows(server, query, *values):
         return connection.execute(query, values).fetchall()
 
 
-async def tell_all(server, folder, station):
-    """Tell until nothing waits; how many entries that were."""
-    told = 0
+async def publish_all(server, folder, station):
+    """Publish until nothing waits; return the number of entries."""
+    count = 0
     async with Postgresql(settings(server), station).connected() as session:
         position = await session.position(read_batch(folder, station, 0))
         while (batch := read_batch(folder, station, position)).up_to > position:
             await session.publish(batch)
-            told, position = told + len(batch.events), batch.up_to
-    return told
+            count, position = count + len(batch.events), batch.up_to
+    return count
 
 
 def test_three_stations_lose_and_double_nothing_while_the_server_is_cut_crashed_and_stopped(
@@ -64,10 +64,10 @@ def test_three_stations_lose_and_double_nothing_while_the_server_is_cut_crashed_
         [sys.executable, program, "--rows", "15000", "--json"], capture_output=True, text=True, timeout=110, check=False
     )
     assert done.stdout, done.stderr[-2000:]
-    said = json.loads(done.stdout)
-    assert said["wrong"] == {"missing": 0, "doubled": 0, "out of order": 0, "refused": 0}
-    assert said["done"]["cut"] > 0
-    assert said["done"]["crashed"] == said["done"]["stopped"] == 3
+    report = json.loads(done.stdout)
+    assert report["wrong"] == {"missing": 0, "doubled": 0, "out of order": 0, "refused": 0}
+    assert report["done"]["cut"] > 0
+    assert report["done"]["crashed"] == report["done"]["stopped"] == 3
 
 
 def test_an_inspection_a_lot_and_an_audit_row_arrive_as_they_are(server, fill, tmp_path):
@@ -79,7 +79,9 @@ def test_an_inspection_a_lot_and_an_audit_row_arrive_as_they_are(server, fill, t
         start_lot(connection, "A\N{LATIN SMALL LETTER U WITH DIAERESIS}", "Meier", IDA)
         end_lot(connection, "A\N{LATIN SMALL LETTER U WITH DIAERESIS}", IDA)
         append_audit(connection, AuditEntry("ada", "quality", "tried", "nothing", "to see", {"a": 1}, [2]))
-    assert asyncio.run(tell_all(server, tmp_path, "as-they-are")) == 3 + 1 + 3, "a lot's start and end are in the trail"
+    assert asyncio.run(publish_all(server, tmp_path, "as-they-are")) == 3 + 1 + 3, (
+        "a lot's start and end are in the trail"
+    )
     query = "SELECT lot, outcome, reasons, area_mm2, fruit, jsonb_array_length(curve), began::text FROM inspections"
     first, *_ = rows(server, f"{query} WHERE station = 'as-they-are' ORDER BY sequence")
     assert first == ("L00000", "PASS", [], 21.0, "raspberry", 4, "2026-01-01 00:00:03+00")
@@ -95,16 +97,16 @@ def test_an_inspection_a_lot_and_an_audit_row_arrive_as_they_are(server, fill, t
         assert (digest,) == database.execute("SELECT hash FROM audit ORDER BY seq DESC").fetchone()
     database.close()
     assert (who, old, new) == ("ada", '{"a":1}', "[2]")
-    assert asyncio.run(tell_all(server, tmp_path, "as-they-are")) == 0, "the server knows how far it was told"
+    assert asyncio.run(publish_all(server, tmp_path, "as-they-are")) == 0, "the server knows the last entry that it has"
 
 
 def test_a_row_that_changed_is_told_again_and_is_there_once(server, fill, tmp_path):
     fill(tmp_path, 1, 2, steps=0)
-    asyncio.run(tell_all(server, tmp_path, "changed"))
+    asyncio.run(publish_all(server, tmp_path, "changed"))
     with short_transaction(tmp_path) as connection:
         connection.exec_driver_sql("UPDATE inspections SET images_state = 'kept' WHERE sequence = 2")
         queue_event(connection, "inspection", 2)
-    asyncio.run(tell_all(server, tmp_path, "changed"))
+    asyncio.run(publish_all(server, tmp_path, "changed"))
     found = rows(server, "SELECT sequence, images_state FROM inspections WHERE station = 'changed' ORDER BY sequence")
     assert found == [(1, str(IMAGES_NOT_WANTED())), (2, str(IMAGES_KEPT()))]
 
@@ -116,7 +118,7 @@ def test_what_no_database_can_hold_is_kept_apart_and_nothing_waits_behind_it(ser
         database.execute("UPDATE inspections SET trigger_id = 5000000000 WHERE sequence = 2")
         database.execute("UPDATE inspections SET began_utc_ms = 9000000000000000 WHERE sequence = 3")
     database.close()
-    asyncio.run(tell_all(server, tmp_path, "odd"))
+    asyncio.run(publish_all(server, tmp_path, "odd"))
     found = rows(server, "SELECT sequence, lot FROM inspections WHERE station = 'odd' ORDER BY sequence")
     assert found == [(1, "nul\N{REPLACEMENT CHARACTER}inside"), (3, "L00000"), (4, "L00000")]
     ((kind, entry, why),) = rows(server, "SELECT kind, entry, error FROM refused WHERE station = 'odd'")
@@ -129,11 +131,11 @@ def test_after_a_restoring_numbers_given_again_are_told(server, fill, tmp_path):
     fill(folder, 1, 5, steps=0)
     make_backup(folder, copy)
     fill(folder, 6, 8, steps=0)
-    asyncio.run(tell_all(server, folder, "restored"))
+    asyncio.run(publish_all(server, folder, "restored"))
     restore_backup(folder, copy, "ada", public_keys_of(folder))
     fill(folder, 9, 10, steps=0)
-    told = asyncio.run(tell_all(server, folder, "restored"))
-    assert told == 1 + 2, "the restoring itself, two inspections, and not all from the first again"
+    count = asyncio.run(publish_all(server, folder, "restored"))
+    assert count == 1 + 2, "the restoring itself, two inspections, and not all from the first again"
     found = rows(server, "SELECT sequence FROM inspections WHERE station = 'restored' ORDER BY sequence")
     assert [number for (number,) in found] == [*range(1, 11)]
 
@@ -178,19 +180,19 @@ def test_two_processes_cannot_tell_as_one_station(server):
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"database": "postgres"}, "has no tables of the station; load deploy/postgresql/schema.sql there"),
         ({"host": "/nowhere"}, "see the server and the outbox's settings"),
         ({"user": "stranger"}, 'role "stranger" does not exist'),
     ],
 )
-def test_what_is_wrong_is_said(server, changes, said):
+def test_what_is_wrong_is_said(server, changes, message):
     async def steps():
         async with Postgresql(settings(server, **changes), "wrong").connected():
             pass
 
-    with pytest.raises(OutboxError, match=said):
+    with pytest.raises(OutboxError, match=message):
         asyncio.run(steps())
 
 
@@ -224,7 +226,7 @@ def test_a_database_of_version_1_is_refused_with_the_remedy_which_makes_it_as_a_
     folder = Path(__file__).resolve().parents[2]
     steps = ("deploy/postgresql/schema-1-to-2.sql", "deploy/postgresql/schema-2-to-3.sql")
     fill(tmp_path, 1, 1500, steps=0)
-    asyncio.run(tell_all(server, tmp_path, "upgraded"))
+    asyncio.run(publish_all(server, tmp_path, "upgraded"))
     with server.connect() as owner:
         owner.execute("CREATE DATABASE old TEMPLATE fruit")
     try:
@@ -298,9 +300,9 @@ def test_the_process_tells_says_how_far_and_ends_in_order(server, fill, tmp_path
         while rows(server, query) != [(40,)] and time.monotonic() < until_s:
             time.sleep(0.1)
         assert rows(server, query) == [(40,)]
-        said = command("outbox", "status", **site)
-        while "40 published, 0 wait" not in said.stdout and time.monotonic() < until_s:
-            said = command("outbox", "status", **site)
-        assert "postgresql: 40 published, 0 wait, 0 refused; connected" in said.stdout
+        done = command("outbox", "status", **site)
+        while "40 published, 0 wait" not in done.stdout and time.monotonic() < until_s:
+            done = command("outbox", "status", **site)
+        assert "postgresql: 40 published, 0 wait, 0 refused; connected" in done.stdout
         process.send_signal(signal.SIGTERM)
         assert process.wait(LIMIT_S) == 0

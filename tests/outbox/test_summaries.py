@@ -1,4 +1,4 @@
-"""The summaries by hour are at all times what the inspections themselves say, and the dashboard's answers too."""
+"""The summaries by hour are at all times those of the inspections themselves, and the dashboard's answers too."""
 
 import asyncio
 from datetime import UTC
@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.fleet import plain
 from benchmarks.fleet.year import equal
-from benchmarks.monitoring.asking import panels, sql
+from benchmarks.monitoring.queries import panels, sql
 from station.outbox.feed import read_batch
 from station.outbox.postgresql import Postgresql
 from station.settings.outbox import OutboxPostgresqlSettings
@@ -41,7 +41,7 @@ def summaries(connection):
 
 
 @pytest.fixture
-def told(server, fill, tmp_path):
+def published(server, fill, tmp_path):
     """Two stations' inspections of two hours each, published by the outbox in batches."""
 
     async def steps():
@@ -59,29 +59,29 @@ def told(server, fill, tmp_path):
     return server
 
 
-def test_summaries_follow_inserts_updates_and_deletes(told):
-    with told.connect() as connection:
-        stored, said = summaries(connection)
-        assert stored == said
+def test_summaries_follow_inserts_updates_and_deletes(published):
+    with published.connect() as connection:
+        stored, computed = summaries(connection)
+        assert stored == computed
         assert all(stored.values())
         connection.execute("UPDATE inspections SET images_state = 'removed' WHERE station = 'summed-1'")
-        assert summaries(connection) == (said, said)
+        assert summaries(connection) == (computed, computed)
         connection.execute(
             "UPDATE inspections SET outcome = 'FAIL', reasons = '{early_stop}', area_mm2 = 'NaN', duration_ms = 0, "
             "fruit = NULL, recipe_sha256 = NULL WHERE station = 'summed-1' AND sequence % 3 = 0"
         )
-        stored, said = summaries(connection)
+        stored, computed = summaries(connection)
         for name in ("hourly_reasons", "hourly_values"):
-            assert stored[name] == said[name]
-        # a lot's first time is kept where the fruit that had it is counted elsewhere: it never changes at a station
-        assert [row[:-1] for row in stored["hourly_outcomes"]] == [row[:-1] for row in said["hourly_outcomes"]]
+            assert stored[name] == computed[name]
+        # a lot's first time remains where the fruit that had it is counted elsewhere: it never changes at a station
+        assert [row[:-1] for row in stored["hourly_outcomes"]] == [row[:-1] for row in computed["hourly_outcomes"]]
         connection.execute("DELETE FROM inspections WHERE station = 'summed-1'")
-        stored, said = summaries(connection)
-        assert stored == said
+        stored, computed = summaries(connection)
+        assert stored == computed
 
 
-def test_a_published_inspection_that_is_published_again_is_counted_once(told):
-    with told.connect() as connection:
+def test_a_published_inspection_that_is_published_again_is_counted_once(published):
+    with published.connect() as connection:
         before = summaries(connection)
         connection.execute(
             "WITH again AS (SELECT * FROM inspections WHERE station = 'summed-2') "
@@ -91,11 +91,11 @@ def test_a_published_inspection_that_is_published_again_is_counted_once(told):
         assert summaries(connection) == before
 
 
-def test_the_dashboard_answers_what_the_inspections_say(told):
+def test_the_dashboard_answers_what_the_inspections_say(published):
     chosen = {"station": ["summed-1", "summed-2"], "fruit": ["strawberry", "raspberry"]}
     titles = plain.STATEMENTS.keys() & QUERIES.keys()
     assert len(titles) == 9
-    with told.connect() as connection:
+    with published.connect() as connection:
         for title in sorted(titles):
             ours, theirs = (
                 connection.execute(sql(text, *MONTH, **chosen).encode()).fetchall()

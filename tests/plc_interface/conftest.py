@@ -52,8 +52,8 @@ class Rig:
         self.outcome: dict[str, Any] = {}
         self.command_fails = ""
         self.commands: list[tuple[str, int]] = []
-        self.begun: list[tuple[int, int, str]] = []
-        """Trigger id, encoder and lot of every inspection."""
+        self.accepted: list[tuple[int, int, str]] = []
+        """Trigger id, encoder and lot of every accepted trigger."""
         self.sizes: list[tuple[int, int]] = []
         """Length and class of every inspection."""
         self.image = RegisterImage(order)
@@ -70,9 +70,9 @@ class Rig:
         self._later.add(handle)
 
     def handle(self, event: events.Event) -> None:
-        self.state, asked = step(self.state, event, self.settings)
+        self.state, todo = step(self.state, event, self.settings)
         self.image.commit(view(self.state))
-        for action in asked:
+        for action in todo:
             self._act(action)
 
     def beat(self) -> None:
@@ -103,12 +103,12 @@ class Rig:
     def _act(self, action: actions.Action) -> None:
         match action:
             case actions.RequestBegin():
-                begun = BeginReply(refusal=self.refusal)
+                reply = BeginReply(refusal=self.refusal)
                 if self.refusal is None:
-                    self.begun.append((action.trigger_id, action.encoder, action.lot))
+                    self.accepted.append((action.trigger_id, action.encoder, action.lot))
                     self.sizes.append((action.fruit_length_mm_x10, action.size_class))
-                    begun = BeginReply(sequence=self.first_sequence + len(self.begun) - 1, deadline_s=5.0)
-                self.soon(0.01, lambda: events.BeginAnswered(now(), action.number, begun))
+                    reply = BeginReply(sequence=self.first_sequence + len(self.accepted) - 1, deadline_s=5.0)
+                self.soon(0.01, lambda: events.BeginAnswered(now(), action.number, reply))
             case actions.RequestOutcome():
                 self.soon(self.inspection_s, lambda: events.OutcomeReceived(now(), self._made(action.sequence)))
             case actions.RequestOpen():
@@ -123,7 +123,7 @@ class Rig:
                 pass
 
     def _made(self, sequence: int) -> Outcome:
-        trigger_id, encoder, lot = self.begun[sequence - self.first_sequence]
+        trigger_id, encoder, lot = self.accepted[sequence - self.first_sequence]
         length, size_class = self.sizes[sequence - self.first_sequence]
         made: dict[str, Any] = {
             "sequence": sequence, "trigger_id": trigger_id, "outcome": "PASS", "reasons": (), "late": False,

@@ -33,12 +33,12 @@ until = functools.partial(eventually.until, patience_s=PATIENCE_S)
 
 
 class ScriptedStation:
-    """Answers the channel as a station does. Its records outlive its process; a test says how it judges."""
+    """Answers the channel as a station does. Its records outlive its process; a test sets how it judges."""
 
     def __init__(self, endpoint: str) -> None:
         self.endpoint = endpoint
         self.boots = 0
-        self.begun: dict[int, Begin] = {}
+        self.accepted: dict[int, Begin] = {}
         self.outcomes: dict[int, Outcome] = {}
         self.published: dict[int, Outcome] = {}
         self.acknowledged = 0
@@ -86,7 +86,7 @@ class ScriptedStation:
         """End the running inspection."""
         assert self.running is not None
         sequence, self.running = self.running, None
-        begin = self.begun[sequence]
+        begin = self.accepted[sequence]
         measured = name != "NO_RESULT"
         values: dict[str, Any] = {
             "sequence": sequence,
@@ -117,8 +117,8 @@ class ScriptedStation:
         await until(lambda: not self.deaf)
         if self.refusal or self.running:
             return BeginReply(refusal=self.refusal or Refusal.BUSY)
-        sequence = max(self.begun, default=100) + 1
-        self.begun[sequence] = request
+        sequence = max(self.accepted, default=100) + 1
+        self.accepted[sequence] = request
         self.running = sequence
         return BeginReply(sequence=sequence, deadline_s=self.deadline_s)
 
@@ -146,9 +146,9 @@ class ScriptedStation:
         return Noted()
 
     async def _resume(self, _request: Resume) -> Open:
-        stands = self.outcomes | self.published
-        running = (self.running, self.begun[self.running].trigger_id) if self.running else None
-        ended = tuple(stands[sequence] for sequence in sorted(stands) if sequence > self.acknowledged)
+        standing = self.outcomes | self.published
+        running = (self.running, self.accepted[self.running].trigger_id) if self.running else None
+        ended = tuple(standing[sequence] for sequence in sorted(standing) if sequence > self.acknowledged)
         return Open(running=running, outcomes=ended)
 
     async def _line(self, request: Line) -> StationState:

@@ -43,11 +43,11 @@ class Fingers:
         return max(from_mm - way, self._to_mm, self.stopped_at_mm) if self._to_mm < from_mm else self._to_mm
 
     async def read(self) -> GripperReading:
-        asked_s, self.now_s = self.now_s, self.now_s + self.answers_in_s
+        requested_s, self.now_s = self.now_s, self.now_s + self.answers_in_s
         width_mm = self.width_at(self.now_s)
         held = self.stopped_at_mm > self._to_mm and width_mm <= self.stopped_at_mm
         state = ObjectState.CONTACT_CLOSING if held else ObjectState.AT_POSITION
-        return GripperReading(width_mm, 0, state, active=True, fault_code=0, current_a=None, at_s=asked_s)
+        return GripperReading(width_mm, 0, state, active=True, fault_code=0, current_a=None, at_s=requested_s)
 
     async def move_to_width(self, width_mm: float, speed_mm_s: float, _force_n: float) -> MoveResult:
         self._stopped.clear()
@@ -189,7 +189,7 @@ def test_fingers_get_on_where_every_measurement_is_late(cell):
         camera, measured = fingers.frame, 0
 
         async def frame(newer_than_s: float, deadline_s: float) -> Frame:
-            for _ in range(5):  # it comes after the move has begun, and after a stop for which nothing is waited
+            for _ in range(5):  # it comes after the move has started, and after a stop for which nothing is waited
                 await asyncio.sleep(0)
             return await camera(newer_than_s, deadline_s)
 

@@ -1,4 +1,4 @@
-"""A site's recipes in a folder of the test's own, and the command line that looks after them."""
+"""A site's recipes in a folder of the test's own, and the command line that manages them."""
 
 import shutil
 from collections.abc import Callable
@@ -27,7 +27,7 @@ def site(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def station(site: Path, home: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str]]:
-    """Call the command line: its exit code, and what it said."""
+    """Run the command line; return its exit code and its output."""
     monkeypatch.setenv("STATION_HOME", str(home))
     monkeypatch.setenv("STATION_RECIPES_FOLDER", str(site))
     return call
@@ -38,13 +38,13 @@ def does(station: Callable[..., tuple[int, str]]) -> Callable[..., str]:
     """Let a person do something with a recipe, and expect that it is done."""
 
     def do(who: str, *arguments: object, why: str = "a test") -> str:
-        code, told = station("recipes", *arguments, "--who", who, "--reason", why)
-        assert code == 0, told
-        return told
+        code, output = station("recipes", *arguments, "--who", who, "--reason", why)
+        assert code == 0, output
+        return output
 
     return do
 
 
 @pytest.fixture
-def begun(station: Callable[..., tuple[int, str]]) -> None:
+def adopted(station: Callable[..., tuple[int, str]]) -> None:
     assert station("recipes", "adopt")[0] == 0

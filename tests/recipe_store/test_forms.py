@@ -1,4 +1,4 @@
-"""Recipe files of every released form are read for ever, and written in the present form with their comments kept."""
+"""Recipe files of every released form are read for ever, and written in the present form with their comments."""
 
 import json
 from pathlib import Path
@@ -84,6 +84,6 @@ def test_a_bad_file_of_an_earlier_form_is_told_with_its_line(earlier_form):
 def test_a_newer_form_is_left_alone(site):
     newer = SCHEMA_VERSION + 1
     text = (site / "strawberry.yaml").read_text().replace("schema_version: 1\n", f"schema_version: {newer}\n")
-    told = rf"x:\d+: schema_version: expected at most {SCHEMA_VERSION}, got {newer} of a newer"
-    with pytest.raises(SettingsError, match=told):
+    message = rf"x:\d+: schema_version: expected at most {SCHEMA_VERSION}, got {newer} of a newer"
+    with pytest.raises(SettingsError, match=message):
         parse_recipe(text, "x")

@@ -41,40 +41,40 @@ def test_what_is_shipped_is_in_force_out_of_the_box(home):
     assert (shipped_folder() / APPROVED_NAME).read_text() == approved_list()
 
 
-def test_a_draft_is_in_force_once_another_person_approves_it(begun, station, does, site, home):
+def test_a_draft_is_in_force_once_another_person_approves_it(adopted, station, does, site, home):
     comments = [line for line in (site / "strawberry.yaml").read_text().splitlines() if "#" in line]
     does("Ida", "edit", "strawberry", "--set", f"{LIMIT}=113.5", why="riper fruit in August")
     assert [line for line in (site / "strawberry.yaml").read_text().splitlines() if "#" in line] == comments
     assert limit(book_of(site, home)) == (112.0, "1")
     assert "revision 2 waits" in does("Ida", "submit", "strawberry")
-    code, told = station("recipes", "approve", "strawberry", "--who", " ida", "--reason", "x")
+    code, output = station("recipes", "approve", "strawberry", "--who", " ida", "--reason", "x")
     assert code == 1
-    assert "Ida is its author; another person has to approve it" in told
+    assert "Ida is its author; another person has to approve it" in output
     assert limit(book_of(site, home)) == (112.0, "1")
     does("Bo", "approve", "strawberry", why="compared with lot 17")
     assert limit(book_of(site, home)) == (113.5, "2")
-    told = station("recipes", "history", "strawberry")[1]
-    assert f"{LIMIT}: 112.0 → 113.5" in told
-    assert "approved by Bo" in told
-    assert "compared with lot 17" in told
+    output = station("recipes", "history", "strawberry")[1]
+    assert f"{LIMIT}: 112.0 → 113.5" in output
+    assert "approved by Bo" in output
+    assert "compared with lot 17" in output
     does("Bo", "retire", "strawberry", why="the season is over")
     assert limit(book_of(site, home)) is None
-    told = station("audit", "show", "--action", "recipe.", "--subject", "strawberry")[1]
+    output = station("audit", "show", "--action", "recipe.", "--subject", "strawberry")[1]
     for action in ("recipe.adopted", "recipe.edited", "recipe.submitted", "recipe.approved", "recipe.retired"):
-        assert action in told
+        assert action in output
     assert station("audit", "verify")[0] == 0
 
 
-def test_the_papers_method_is_for_analyses_and_is_not_submitted_for_inspections(begun, station, site, home):
+def test_the_papers_method_is_for_analyses_and_is_not_submitted_for_inspections(adopted, station, site, home):
     place = site / "strawberry.yaml"
     place.write_text(place.read_text().replace("method: robust", "method: paper"))
     assert station("recipes", "check", place)[0] == 0
-    code, told = station("recipes", "submit", "strawberry", "--who", "Ida", "--reason", "x")
-    assert (code, told) == (2, str(recipes.NOT_FOR_INSPECTIONS(recipe="strawberry")))
+    code, output = station("recipes", "submit", "strawberry", "--who", "Ida", "--reason", "x")
+    assert (code, output) == (2, str(recipes.NOT_FOR_INSPECTIONS(recipe="strawberry")))
     assert [each.number for each in book_of(site, home)._store.history("strawberry")] == [1]
 
 
-def test_a_hand_edit_is_noticed_shown_and_not_live(begun, station, site, home):
+def test_a_hand_edit_is_noticed_shown_and_not_live(adopted, station, site, home):
     book = book_of(site, home)
     file = site / "strawberry.yaml"
     file.write_text(file.read_text().replace("area_mm2: 112\n", "area_mm2: 117\n"))
@@ -93,9 +93,9 @@ def test_a_hand_edit_is_noticed_shown_and_not_live(begun, station, site, home):
     assert "strawberry.yaml:1: file: expected valid YAML" in "".join(map(str, book.problems))
 
 
-def test_a_bad_edit_leaves_the_file_as_it_was(begun, station, site):
+def test_a_bad_edit_leaves_the_file_as_it_was(adopted, station, site):
     before = (site / "strawberry.yaml").read_bytes()
-    for change, told in {
+    for change, message in {
         f"{LIMIT}=300": "expected a number above 0 and at most 260 mm²",
         f"{LIMIT}=NO": "write",
         "early_stop.area_mm2=5": "no less than the largest damage threshold",
@@ -108,13 +108,13 @@ def test_a_bad_edit_leaves_the_file_as_it_was(begun, station, site):
         "=113": "expected the path of a value",
         "nonsense": "expected PATH=VALUE",
     }.items():
-        code, said = station("recipes", "edit", "strawberry", "--set", change, "--who", "Ida", "--reason", "x")
+        code, output = station("recipes", "edit", "strawberry", "--set", change, "--who", "Ida", "--reason", "x")
         assert code == 2
-        assert told in said
+        assert message in output
     assert (site / "strawberry.yaml").read_bytes() == before
 
 
-def test_of_two_people_the_second_is_told_what_the_first_has_changed(begun, station, does, site, tmp_path):
+def test_of_two_people_the_second_is_told_what_the_first_has_changed(adopted, station, does, site, tmp_path):
     ours, theirs = tmp_path / "ida.yaml", tmp_path / "bo.yaml"
     for file in (ours, theirs):
         assert station("recipes", "export", "strawberry", "--out", file)[0] == 0
@@ -123,27 +123,27 @@ def test_of_two_people_the_second_is_told_what_the_first_has_changed(begun, stat
     does("Ida", "import", ours)
     after_ida = (site / "strawberry.yaml").read_bytes()
     assert b"# base" not in after_ida
-    code, told = station("recipes", "import", theirs, "--who", "Bo", "--reason", "x")
+    code, output = station("recipes", "import", theirs, "--who", "Bo", "--reason", "x")
     assert code == 1
-    assert f"to 9986814c3e22: {LIMIT}: 112.0 → 113.0" in told
+    assert f"to 9986814c3e22: {LIMIT}: 112.0 → 113.0" in output
     assert (site / "strawberry.yaml").read_bytes() == after_ida
     base = content_sha256(load_recipe(site / "strawberry.yaml"))[:12]
     does("Bo", "edit", "strawberry", "--set", f"{LIMIT}=114", "--base", base)
-    code, told = station(
+    code, output = station(
         "recipes", "edit", "strawberry", "--set", f"{LIMIT}=115", "--base", base, "--who", "Ida", "--reason", "x"
     )
     assert code == 1
     does("Bo", "submit", "strawberry")
     does("Cy", "edit", "strawberry", "--set", f"{LIMIT}=116")
-    code, told = station("recipes", "submit", "strawberry", "--who", "Cy", "--reason", "x")
+    code, output = station("recipes", "submit", "strawberry", "--who", "Cy", "--reason", "x")
     assert code == 1
-    assert f"revision 2 of Bo waits for approval, and differs from this one: {LIMIT}: 114.0 → 116.0" in told
-    code, told = station("recipes", "approve", "strawberry", "--who", "Ida", "--reason", "x")
+    assert f"revision 2 of Bo waits for approval, and differs from this one: {LIMIT}: 114.0 → 116.0" in output
+    code, output = station("recipes", "approve", "strawberry", "--who", "Ida", "--reason", "x")
     assert code == 1
-    assert f"file differs: {LIMIT}: 114.0 → 116.0" in told
+    assert f"file differs: {LIMIT}: 114.0 → 116.0" in output
 
 
-def test_revert_puts_the_approved_text_back_and_keeps_what_stood_there(begun, station, does, site, home):
+def test_revert_puts_the_approved_text_back_and_keeps_what_stood_there(adopted, station, does, site, home):
     approved = (site / "strawberry.yaml").read_bytes()
     (site / "strawberry.yaml").write_text("what a mess")
     does("Ida", "revert", "strawberry")
@@ -153,7 +153,7 @@ def test_revert_puts_the_approved_text_back_and_keeps_what_stood_there(begun, st
     assert "file: approved" in station("recipes", "list")[1]
 
 
-def test_what_would_break_another_recipes_file_is_refused_and_not_written(begun, station, does, site, tmp_path):
+def test_what_would_break_another_recipes_file_is_refused_and_not_written(adopted, station, does, site, tmp_path):
     gooseberry = tmp_path / "gooseberry.yaml"
     gooseberry.write_text((site / "blueberry.yaml").read_text().replace("name: blueberry", "name: gooseberry"))
     does("Ida", "edit", "raspberry", "--set", "plc_number=9")
@@ -163,8 +163,8 @@ def test_what_would_break_another_recipes_file_is_refused_and_not_written(begun,
     exported.write_text(exported.read_text().replace("plc_number: 3", "plc_number: 2"))
 
     def state():
-        told = station("audit", "show")[1]
-        return {file.name: file.read_bytes() for file in site.iterdir()}, told, station("recipes", "list")[1]
+        trail = station("audit", "show")[1]
+        return {file.name: file.read_bytes() for file in site.iterdir()}, trail, station("recipes", "list")[1]
 
     before, clash = state(), "plc_number: expected one recipe with {}, but {} has it too"
     for arguments, number, other in (
@@ -173,25 +173,25 @@ def test_what_would_break_another_recipes_file_is_refused_and_not_written(begun,
         (("edit", "strawberry", "--set", "plc_number=2"), 2, "blueberry"),
         (("revert", "raspberry"), 3, "strawberry"),
     ):
-        code, told = station("recipes", *arguments, "--who", "Ida", "--reason", "x")
-        assert (code, clash.format(number, site / f"{other}.yaml") in told) == (2, True), told
+        code, output = station("recipes", *arguments, "--who", "Ida", "--reason", "x")
+        assert (code, clash.format(number, site / f"{other}.yaml") in output) == (2, True), output
         assert state() == before
-    code, told = station("recipes", "edit", "strawberry", "--set", "name=blueberry", "--who", "Ida", "--reason", "x")
+    code, output = station("recipes", "edit", "strawberry", "--set", "name=blueberry", "--who", "Ida", "--reason", "x")
     assert code == 2
-    assert f"name: expected one recipe with blueberry, but {site / 'blueberry.yaml'} has it too" in told
+    assert f"name: expected one recipe with blueberry, but {site / 'blueberry.yaml'} has it too" in output
     assert state() == before
 
 
-def test_two_recipes_never_share_the_plcs_number(begun, station, does, site):
+def test_two_recipes_never_share_the_plcs_number(adopted, station, does, site):
     (site / "raspberry.yaml").unlink()
     does("Ida", "edit", "blueberry", "--set", "plc_number=3")
     does("Ida", "submit", "blueberry")
-    code, told = station("recipes", "approve", "blueberry", "--who", "Bo", "--reason", "x")
+    code, output = station("recipes", "approve", "blueberry", "--who", "Bo", "--reason", "x")
     assert code == 1
-    assert "its PLC number 3 is that of the approved raspberry" in told
+    assert "its PLC number 3 is that of the approved raspberry" in output
 
 
-def test_number_name_and_content_have_to_belong_together(begun, does, site, home):
+def test_number_name_and_content_have_to_belong_together(adopted, does, site, home):
     book = book_of(site, home)
     strawberry = book.find(1)
     assert strawberry is not None
@@ -210,7 +210,7 @@ def test_number_name_and_content_have_to_belong_together(begun, does, site, home
     assert gone.value.message == recipes.GONE(recipe="strawberry", number=1)
 
 
-def test_a_lot_goes_on_over_a_restart_only_with_what_its_revision_says(begun, does, site, home):
+def test_a_lot_goes_on_over_a_restart_only_with_what_its_revision_says(adopted, does, site, home):
     book = book_of(site, home)
     first = book.find(1)
     assert first is not None
@@ -219,14 +219,14 @@ def test_a_lot_goes_on_over_a_restart_only_with_what_its_revision_says(begun, do
     does("Ida", "submit", "strawberry")
     does("Bo", "approve", "strawberry")
     assert book_of(site, home).restored() == (first, "A-17"), "the lot began with revision 1"
-    kept = home / "active_recipe.json"
-    kept.write_text(kept.read_text().replace("112.0", "117.0"))
+    stored = home / "active_recipe.json"
+    stored.write_text(stored.read_text().replace("112.0", "117.0"))
     remembered = book_of(site, home).restored()
     assert remembered is not None
     assert (remembered.lot, remembered.active.snapshot.revision) == (None, "2"), "what was tampered with is not used"
 
 
-def test_what_was_in_force_stays_so_without_the_database(begun, does, site, home):
+def test_what_was_in_force_stays_so_without_the_database(adopted, does, site, home):
     assert limit(book_of(site, home)) == (112.0, "1")
     file = site / "strawberry.yaml"
     file.write_text(file.read_text().replace("area_mm2: 112\n", "area_mm2: 117\n"))
@@ -238,7 +238,7 @@ def test_what_was_in_force_stays_so_without_the_database(begun, does, site, home
     assert recipes.FILE_IS_CHANGED.id in {problem.id for problem in book.problems}
 
 
-def test_a_full_or_read_only_disk_changes_nothing(begun, station, does, tmp_path, site, home, monkeypatch):
+def test_a_full_or_read_only_disk_changes_nothing(adopted, station, does, tmp_path, site, home, monkeypatch):
     disk = tmp_path / "disk"
     disk.mkdir()
     done = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", disk], capture_output=True, check=False)
@@ -255,14 +255,14 @@ def test_a_full_or_read_only_disk_changes_nothing(begun, station, does, tmp_path
                     filler.write(bytes(1024))
             except OSError:
                 pass
-        code, told = station("recipes", *edit, "--who", "Ida", "--reason", "x")
+        code, output = station("recipes", *edit, "--who", "Ida", "--reason", "x")
         assert code == 1
-        assert "cannot be written: No space left on device" in told
+        assert "cannot be written: No space left on device" in output
         (disk / "filler").unlink()
         subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
-        code, told = station("recipes", *edit, "--who", "Ida", "--reason", "x")
+        code, output = station("recipes", *edit, "--who", "Ida", "--reason", "x")
         assert code == 1
-        assert "Read-only file system" in told
+        assert "Read-only file system" in output
         assert (folder / "strawberry.yaml").read_bytes() == before
         assert sorted(os.listdir(folder)) == sorted(os.listdir(site)), "no unfinished file is left"  # noqa: PTH208
         assert "recipe.edited" not in station("audit", "show")[1]
@@ -278,7 +278,7 @@ def _full(*_):
     raise OSError(errno.ENOSPC, "No space left on device")
 
 
-def test_an_edit_whose_audit_row_cannot_be_written_leaves_the_file(begun, station, site, monkeypatch):
+def test_an_edit_whose_audit_row_cannot_be_written_leaves_the_file(adopted, station, site, monkeypatch):
     before, files = (site / "strawberry.yaml").read_bytes(), sorted(site.iterdir())
 
     def commit(_dialect, connection):
@@ -292,37 +292,39 @@ def test_an_edit_whose_audit_row_cannot_be_written_leaves_the_file(begun, statio
     assert "recipe.edited" not in station("audit", "show")[1]
 
 
-def test_the_audit_trail_says_that_an_edited_file_could_not_be_written(begun, station, site, monkeypatch):
+def test_the_audit_trail_says_that_an_edited_file_could_not_be_written(adopted, station, site, monkeypatch):
     before, files = (site / "strawberry.yaml").read_bytes(), sorted(site.iterdir())
     with monkeypatch.context() as patch:
         patch.setattr(Path, "replace", _full)
-        code, told = station(*EDIT)
+        code, output = station(*EDIT)
     assert code == 1
-    assert "cannot be written: No space left on device" in told
+    assert "cannot be written: No space left on device" in output
     assert (site / "strawberry.yaml").read_bytes() == before
     assert sorted(site.iterdir()) == files
-    told = station("audit", "show", "--action", "recipe.", "--last", "2")[1]
-    assert told.index("recipe.edited") < told.index("recipe.not_written")
-    assert "No space left on device" in told
+    output = station("audit", "show", "--action", "recipe.", "--last", "2")[1]
+    assert output.index("recipe.edited") < output.index("recipe.not_written")
+    assert "No space left on device" in output
 
 
 def test_an_edited_file_that_is_in_place_and_may_not_be_durable_is_not_called_unchanged(
-    begun, station, site, monkeypatch, caplog
+    adopted, station, site, monkeypatch, caplog
 ):
     def failing(_folder):
         raise OSError(errno.EIO, "Input/output error")
 
     with monkeypatch.context() as patch:
         patch.setattr(files, "sync_folder", failing)
-        code, told = station(*EDIT)
-    assert code == 0, told
+        code, output = station(*EDIT)
+    assert code == 0, output
     assert load_recipe(site / "strawberry.yaml").damage.area[0].area_mm2 == 113
     (warning,) = [record.getMessage() for record in caplog.records if record.name == files.__name__]
     assert "strawberry.yaml: written, but a loss of power may bring the former file back: " in warning
     assert "recipe.not_written" not in station("audit", "show")[1]
 
 
-def test_nothing_of_an_edit_waits_for_the_disk_while_the_station_cannot_write(begun, station, site, home, monkeypatch):
+def test_nothing_of_an_edit_waits_for_the_disk_while_the_station_cannot_write(
+    adopted, station, site, home, monkeypatch
+):
     """In the transaction another writer is locked out: with the new file in place, the row has to be durable."""
     rows = []
     put = Path.replace
@@ -340,15 +342,15 @@ def test_nothing_of_an_edit_waits_for_the_disk_while_the_station_cannot_write(be
     assert rows == [("recipe.edited",)]
 
 
-def test_the_shipped_files_are_not_edited_in_place(begun, station, monkeypatch):
+def test_the_shipped_files_are_not_edited_in_place(adopted, station, monkeypatch):
     monkeypatch.delenv("STATION_RECIPES_FOLDER")
-    code, told = station("recipes", "edit", "strawberry", "--set", f"{LIMIT}=1", "--who", "Ida", "--reason", "x")
+    code, output = station("recipes", "edit", "strawberry", "--set", f"{LIMIT}=1", "--who", "Ida", "--reason", "x")
     assert code == 1
-    assert "copy them into a folder of the site's" in told
+    assert "copy them into a folder of the site's" in output
 
 
 @pytest.mark.parametrize(
-    ("arguments", "exit_code", "told"),
+    ("arguments", "exit_code", "message"),
     [
         (("submit", "cherry"), 2, "expected one of blueberry"),
         (("submit", "strawberry"), 1, "revision 1, which is approved already"),
@@ -357,10 +359,10 @@ def test_the_shipped_files_are_not_edited_in_place(begun, station, monkeypatch):
         (("import", "none.yaml"), 2, "expected a readable file"),
     ],
 )
-def test_what_cannot_be_done_is_told(begun, station, arguments, exit_code, told):
-    code, said = station("recipes", *arguments, "--who", "Ida", "--reason", "x")
+def test_what_cannot_be_done_is_told(adopted, station, arguments, exit_code, message):
+    code, output = station("recipes", *arguments, "--who", "Ida", "--reason", "x")
     assert code == exit_code
-    assert told in said
+    assert message in output
 
 
 def test_the_hash_is_the_snapshots(site):

@@ -80,12 +80,12 @@ def test_a_draft_that_is_refused_now_neither_ends_the_station_nor_the_work_on_it
 
     edit = ("edit", "raspberry", "--set", "damage.area[0].least_area_mm2=41", "--base", seen)
     for who, arguments in (("Cy", ("submit", "raspberry")), ("Bo", ("approve", "raspberry")), ("Ida", edit)):
-        code, told = station("recipes", *arguments, "--who", who, "--reason", "x")
+        code, output = station("recipes", *arguments, "--who", who, "--reason", "x")
         assert code == 1
-        assert NOT_ACCEPTED.format(2) in told
-    code, told = station("recipes", "history", "raspberry")
+        assert NOT_ACCEPTED.format(2) in output
+    code, output = station("recipes", "history", "raspberry")
     assert code == 0
-    assert "    raspberry@2:66: damage.area[0].least_area_mm2: expected room" in told
+    assert "    raspberry@2:66: damage.area[0].least_area_mm2: expected room" in output
     does("Ida", "submit", "raspberry")
     does("Bo", "approve", "raspberry")
     assert in_force(book_of(site, home)) == ("3", 40)

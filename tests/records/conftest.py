@@ -48,7 +48,7 @@ def opened(folder: Path) -> Open:
 
 
 @pytest.fixture
-def ask(folder: Path) -> Callable[..., Result]:
+def run_records(folder: Path) -> Callable[..., Result]:
     """Run `station records …` on this folder."""
 
     def run(*arguments: object) -> Result:

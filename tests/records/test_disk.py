@@ -1,4 +1,4 @@
-"""Full, read-only, locked, damaged and missing: said in words, and got over where that is safe."""
+"""Disk faults: full, read-only, locked, damaged, missing; each is reported, and overcome where that is safe."""
 
 import asyncio
 import contextlib
@@ -114,11 +114,11 @@ def test_a_file_size_limit_is_told_and_nothing_is_lost(opened, scenario, trigger
                     await begin_many(records, (bulky(trigger, 40_000) for _ in range(100)))
             finally:
                 resource.setrlimit(resource.RLIMIT_FSIZE, before)
-            begun = len((await records.open_inspections()).running)
-            assert begun > 0
+            count = len((await records.open_inspections()).running)
+            assert count > 0
             sequence = await records.begin(trigger)
             running = (await records.open_inspections()).running
-            assert running == (*((number, 7) for number in range(1, begun + 1)), (sequence, 7))
+            assert running == (*((number, 7) for number in range(1, count + 1)), (sequence, 7))
 
     scenario(steps)
 
@@ -253,7 +253,7 @@ def test_a_begin_withdrawn_while_the_records_close_is_withdrawn(opened, scenario
 
     async def steps():
         async with opened(deadline_s=0.2) as records:
-            while not records._opened.images._counted:  # its thread asks the writer, whose end waits for it
+            while not records._opened.images._counted:  # its thread waits for the writer, whose end waits for it
                 await asyncio.sleep(0.005)
             with monkeypatch.context() as patch:
                 patch.setattr(HighWaterMark, "save", slowly)
@@ -422,7 +422,7 @@ def test_a_database_taken_away_is_noticed_and_begun_anew_on_demand(
 
 
 def test_an_inspection_whose_database_was_taken_away_is_concluded_in_the_new_one(
-    opened, scenario, trigger, failed, folder, ask
+    opened, scenario, trigger, failed, folder, run_records
 ):
     async def steps():
         async with opened() as records:
@@ -442,7 +442,7 @@ def test_an_inspection_whose_database_was_taken_away_is_concluded_in_the_new_one
             assert (full.trigger, full.judged.outcome, full.judged.curve) == (trigger, "FAIL", failed.curve)
 
     scenario(steps)
-    found = ask("check").output
+    found = run_records("check").output
     assert "fault" not in found.replace("fault: the audit trail: row", "")
     assert "which one was the last was not known" in found or "was known to be the last" in found
 
@@ -491,8 +491,8 @@ def test_numbers_are_refused_when_nothing_tells_which_were_given(opened, scenari
             async with opened():
                 pass
         assert not (folder / "aside").exists(), "nothing was changed"
-        said = CliRunner(env={"STATION_HOME": str(folder.parent)}).invoke(cli, ["records", "continue-after", "700"])
-        assert (said.output, said.exit_code) == ("the next inspection is number 701\n", 0)
+        result = CliRunner(env={"STATION_HOME": str(folder.parent)}).invoke(cli, ["records", "continue-after", "700"])
+        assert (result.output, result.exit_code) == ("the next inspection is number 701\n", 0)
         async with opened() as records:
             assert await records.begin(trigger) == 701
 

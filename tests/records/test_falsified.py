@@ -18,7 +18,7 @@ TRIGGERS = ("audit_no_update", "audit_no_delete", "audit_only_after")
 
 
 @pytest.fixture
-def kept(opened, scenario, folder, trigger, passed, failed, noise, settled, ask, tmp_path):
+def key_and_anchor(opened, scenario, folder, trigger, passed, failed, noise, settled, run_records, tmp_path):
     """The records of three fruit, and what a person keeps elsewhere: the public key, an anchor, a backup."""
 
     async def steps():
@@ -31,15 +31,15 @@ def kept(opened, scenario, folder, trigger, passed, failed, noise, settled, ask,
     scenario(steps)
     key = tmp_path / "site.pem"
     shutil.copy(folder / "public_key.pem", key)
-    said = ask("backup", tmp_path / "copy").output
-    anchor = said.split()[-1]
-    assert ask("check", "--public-key", key, "--anchor", anchor).exit_code == 0
+    output = run_records("backup", tmp_path / "copy").output
+    anchor = output.split()[-1]
+    assert run_records("check", "--public-key", key, "--anchor", anchor).exit_code == 0
     (folder / "signing_key.pem").unlink()  # a copy of the records elsewhere is without it
     return key, anchor
 
 
 def change(folder, *statements):
-    """Change the database as whoever has the file can: its triggers are put back afterwards."""
+    """Change the database as anyone with the file can: its triggers are put back afterwards."""
     connection = sqlite3.connect(folder / FILE_NAME)
     triggers = [connection.execute("SELECT sql FROM sqlite_master WHERE name = ?", (name,)) for name in TRIGGERS]
     texts = [found.fetchone()[0] for found in triggers]
@@ -164,32 +164,32 @@ FALSIFIED = [
 ]
 
 
-@pytest.mark.parametrize(("falsify", "told"), FALSIFIED, ids=lambda value: getattr(value, "__name__", ""))
-def test_a_falsified_copy_is_found_by_the_public_key(kept, folder, ask, falsify, told):
-    key, anchor = kept
+@pytest.mark.parametrize(("falsify", "message"), FALSIFIED, ids=lambda value: getattr(value, "__name__", ""))
+def test_a_falsified_copy_is_found_by_the_public_key(key_and_anchor, folder, run_records, falsify, message):
+    key, anchor = key_and_anchor
     falsify(folder)
-    said = ask("check", "--public-key", key)
-    assert said.exit_code == 1
-    assert told in said.output
+    result = run_records("check", "--public-key", key)
+    assert result.exit_code == 1
+    assert message in result.output
     if falsify in {a_cut_chain, a_rewritten_chain, a_removed_head}:
-        said = ask("check", "--public-key", key, "--anchor", anchor)
-        assert f"row {anchor.split(':')[0]}: " in said.output
-        assert "the anchor names" in said.output
+        result = run_records("check", "--public-key", key, "--anchor", anchor)
+        assert f"row {anchor.split(':')[0]}: " in result.output
+        assert "the anchor names" in result.output
 
 
-def test_a_rewritten_anchor_is_found(kept, folder, ask):
+def test_a_rewritten_anchor_is_found(key_and_anchor, folder, run_records):
     """The chain is written anew, and the noted anchor made to fit it."""
-    key, anchor = kept
+    key, anchor = key_and_anchor
     head = rewrite_chain(folder, lambda row: replace(row, who="Eve"))
-    said = ask("check", "--public-key", key, "--anchor", f"{head.seq}:{head.hash}:{anchor.split(':')[2]}")
-    assert said.exit_code == 1
-    assert f"row {head.seq}: the anchor is not signed by the station's key" in said.output
-    said = ask("check", "--public-key", key, "--anchor", f"{head.seq}:{head.hash}")
-    assert "with --public-key an anchor needs its signature" in str(said.exception)
+    result = run_records("check", "--public-key", key, "--anchor", f"{head.seq}:{head.hash}:{anchor.split(':')[2]}")
+    assert result.exit_code == 1
+    assert f"row {head.seq}: the anchor is not signed by the station's key" in result.output
+    result = run_records("check", "--public-key", key, "--anchor", f"{head.seq}:{head.hash}")
+    assert "with --public-key an anchor needs its signature" in str(result.exception)
 
 
-def test_a_backup_with_an_added_trigger_and_a_new_hash_is_not_put_back(kept, folder, ask, tmp_path):
-    key, _ = kept
+def test_a_backup_with_an_added_trigger_and_a_new_hash_is_not_put_back(key_and_anchor, folder, run_records, tmp_path):
+    key, _ = key_and_anchor
     copy = tmp_path / "copy"
     connection = sqlite3.connect(copy / FILE_NAME)
     connection.execute("CREATE TRIGGER later AFTER INSERT ON audit BEGIN DELETE FROM inspections; END")
@@ -199,10 +199,10 @@ def test_a_backup_with_an_added_trigger_and_a_new_hash_is_not_put_back(kept, fol
     manifest["database_sha256"] = hash_of(copy / FILE_NAME)
     (copy / MANIFEST_NAME).write_text(json.dumps(manifest))
     before = (folder / FILE_NAME).read_bytes()
-    said = ask("restore", copy, "--public-key", key)
-    assert said.exit_code == 1
-    assert "is not signed by the key" in str(said.exception)
-    said = ask("restore", copy, "--unverified")
-    assert said.exit_code == 1
-    assert "trigger later is not the station's" in str(said.exception)
+    result = run_records("restore", copy, "--public-key", key)
+    assert result.exit_code == 1
+    assert "is not signed by the key" in str(result.exception)
+    result = run_records("restore", copy, "--unverified")
+    assert result.exit_code == 1
+    assert "trigger later is not the station's" in str(result.exception)
     assert (folder / FILE_NAME).read_bytes() == before

@@ -1,4 +1,4 @@
-"""Stored images: the fruit whose images are kept, for how long, and the state of those that are not."""
+"""Stored images: of which fruit, for how long, and the state of those that are not."""
 
 import asyncio
 import errno
@@ -77,8 +77,8 @@ def test_a_share_of_the_accepted_is_kept(opened, scenario, inspected, noise, set
 
 @given(st.integers(0, 2**32 - 200), st.floats(0, 1))
 def test_the_share_is_evenly_spread(first, share):
-    kept = sum(accepted_is_stored(sequence, share) for sequence in range(first + 1, first + 101))
-    assert abs(kept - 100 * share) <= 1 + 1e-6
+    stored = sum(accepted_is_stored(sequence, share) for sequence in range(first + 1, first + 101))
+    assert abs(stored - 100 * share) <= 1 + 1e-6
 
 
 def test_beyond_the_quota_the_oldest_accepted_go_first_then_the_oldest_rejected(
@@ -94,21 +94,21 @@ def test_beyond_the_quota_the_oldest_accepted_go_first_then_the_oldest_rejected(
                 await settled(records)
                 return number
 
-            async def kept():
+            async def stored():
                 return [n for n in numbers if read_record(records, n).images_state == messages.IMAGES_KEPT()]
 
             numbers = [await add(accepted=False), await add(accepted=True), await add(accepted=True)]
-            assert await kept() == [1, 2, 3]
+            assert await stored() == [1, 2, 3]
             numbers.append(await add(accepted=True))
-            assert await kept() == [1, 3, 4], "the oldest accepted went"
+            assert await stored() == [1, 3, 4], "the oldest accepted went"
             numbers += [await add(accepted=False), await add(accepted=False)]
-            assert await kept() == [1, 5, 6], "the accepted went before any rejected"
+            assert await stored() == [1, 5, 6], "the accepted went before any rejected"
             numbers.append(await add(accepted=True))
-            assert await kept() == [1, 5, 6], "an accepted one pushes out no rejected one"
+            assert await stored() == [1, 5, 6], "an accepted one pushes out no rejected one"
             last = read_record(records, 7)
             assert last.images_state == messages.IMAGES_DROPPED(cause=messages.QUOTA_FULL())
             numbers.append(await add(accepted=False))
-            assert await kept() == [5, 6, 8]
+            assert await stored() == [5, 6, 8]
             assert read_record(records, 1).images_state == messages.IMAGES_REMOVED()
             files = list((records.folder / "images").glob("*/*"))
             assert len(files) == 3
@@ -261,11 +261,11 @@ def test_a_start_removes_files_that_nothing_refers_to_and_says_which_images_were
 ):
     async def steps():
         async with opened() as records:
-            kept = await inspected(records, noise())
+            whole = await inspected(records, noise())
             lost = await inspected(records, noise())
             await settled(records)
             folder = records.folder / "images"
-            (image,) = read_record(records, kept).images
+            (image,) = read_record(records, whole).images
             orphans = [folder / "ab" / f"ab{'0' * 62}.png", folder / image.sha256[:2] / "x.partial"]
             for orphan in orphans:
                 orphan.parent.mkdir(exist_ok=True)

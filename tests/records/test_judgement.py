@@ -16,19 +16,19 @@ from tests.inspection.test_sized_limits import RECIPE, pressed, recipe_with
 
 def test_a_budget_is_kept_and_read_back_as_its_table():
     verdict = judge(pressed(80, FruitSize(48.0)), RECIPE)
-    kept = judgement_measures(verdict)
+    measures = judgement_measures(verdict)
     assert verdict.summary
     assert verdict.summary.id == AREA_AND_LIMIT.id
     limit = LIMIT_OF_LENGTH(fruit="Strawberry", length_mm=48.0, limit_mm2=100 * (48 / 40) ** 0.8)
     assert verdict.summary.parameters == {
         "closing_mm": 3.0, "area_mm2": 80.0, "uncertainty_mm2": pytest.approx(4.2, abs=0.05), "limit": limit
     }  # fmt: skip
-    assert limit_factor(kept) == pytest.approx((48 / 40) ** 0.8, abs=1e-5)
-    rows = dict(budget_rows(kept))
+    assert limit_factor(measures) == pytest.approx((48 / 40) ** 0.8, abs=1e-5)
+    rows = dict(budget_rows(measures))
     assert list(rows)[-2:] == ["combined", "guard band, 1.64 times that"]
     assert rows["length of the fruit"] == pytest.approx(0.8 * 0.6 / 48)
     assert rows["guard band, 1.64 times that"] == pytest.approx(verdict.budget.expanded, rel=1e-3)
-    assert all(is_judgement(name) for name in kept if name != "limit_factor")
+    assert all(is_judgement(name) for name in measures if name != "limit_factor")
     assert not is_judgement("onset_uncertainty_mm")
 
 

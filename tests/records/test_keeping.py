@@ -40,16 +40,16 @@ def names(folder):
     return sorted(file.stem for file in (folder / "images").glob("*/*.png"))
 
 
-def test_what_is_on_hold_stays_until_it_is_released(opened, scenario, inspected, noise, folder, ask):
+def test_what_is_on_hold_stays_until_it_is_released(opened, scenario, inspected, noise, folder, run_records):
     """An image is 0.3 MB, so that 3 fit."""
 
     async def steps():
         async with opened(images_quota_mb=1) as records:
             for _ in range(3):
                 await inspected(records, 1, noise(side_px=320))
-            said = await asyncio.to_thread(ask, "hold", 1, "--reason", "a complaint", "--by", "ada")
-            assert "the images of inspection 1 are retained" in said.output
-            assert said.output.endswith("stored of it: 1 images (kept)\n")
+            result = await asyncio.to_thread(run_records, "hold", 1, "--reason", "a complaint", "--by", "ada")
+            assert "the images of inspection 1 are retained" in result.output
+            assert result.output.endswith("stored of it: 1 images (kept)\n")
             for _ in range(2):
                 await inspected(records, 1, noise(side_px=320))
             states = [read_record(records, number).images_state for number in (1, 2, 3)]
@@ -60,25 +60,27 @@ def test_what_is_on_hold_stays_until_it_is_released(opened, scenario, inspected,
             assert last.images_state == messages.IMAGES_DROPPED(cause=messages.QUOTA_FULL())
             assert records.status().images["dropped"] == 1, "a rejected fruit's images are lost"
             await records.change(lambda connection: release(connection, "A-17", "all is well", "ada"))
-            assert (await asyncio.to_thread(ask, "release", 1, "--reason", "answered")).exit_code == 0
+            assert (await asyncio.to_thread(run_records, "release", 1, "--reason", "answered")).exit_code == 0
             await inspected(records, 1, noise(side_px=320))
             assert read_record(records, 1).images_state == messages.IMAGES_REMOVED()
 
     scenario(steps)
-    assert ask("holds").output == ""
-    again = ask("hold", 1, "--reason", "too late").output
+    assert run_records("holds").output == ""
+    again = run_records("hold", 1, "--reason", "too late").output
     assert again.endswith("stored of it: 0 images (removed: space for newer ones)\n")
-    assert ask("hold", "A-17", "--reason", "the lot").output.endswith("stored of it: images of 3 of 7 inspections\n")
+    assert run_records("hold", "A-17", "--reason", "the lot").output.endswith(
+        "stored of it: images of 3 of 7 inspections\n"
+    )
     for arguments in (("release", 1), ("release", "A-17")):
-        assert ask(*arguments, "--reason", "tried").exit_code == 0
+        assert run_records(*arguments, "--reason", "tried").exit_code == 0
     for arguments in (("hold", 99), ("release", 1), ("hold", "nowhere")):
-        said = ask(*arguments, "--reason", "why not")
-        assert said.exit_code == 1
-        assert "records list` shows" in str(said.exception) or "are not retained" in str(said.exception)
-    assert ask("hold", 1, "--reason", " ").exit_code == 1
+        result = run_records(*arguments, "--reason", "why not")
+        assert result.exit_code == 1
+        assert "records list` shows" in str(result.exception) or "are not retained" in str(result.exception)
+    assert run_records("hold", 1, "--reason", " ").exit_code == 1
 
 
-def test_a_lot_that_is_named_by_a_number_is_not_taken_for_an_inspection(opened, scenario, passed, trigger, ask):
+def test_a_lot_that_is_named_by_a_number_is_not_taken_for_an_inspection(opened, scenario, passed, trigger, run_records):
     async def steps():
         async with opened() as records:
             for lot in ("2", "A-17"):
@@ -86,17 +88,17 @@ def test_a_lot_that_is_named_by_a_number_is_not_taken_for_an_inspection(opened, 
 
     scenario(steps)
     for command in ("hold", "release"):
-        refused = ask(command, 2, "--reason", "a complaint")
+        refused = run_records(command, 2, "--reason", "a complaint")
         assert (refused.exit_code, refused.exception.cause) == (1, messages.NUMBER_AND_LOT(lot="2"))
-    assert "inspection 1 are retained" in ask("hold", 1, "--reason", "no lot has that name").output
-    assert "lot 2 are retained" in ask("hold", 2, "--lot", "--reason", "a complaint").output
-    held = ask("hold", 2, "--inspection", "--reason", "a complaint").output
+    assert "inspection 1 are retained" in run_records("hold", 1, "--reason", "no lot has that name").output
+    assert "lot 2 are retained" in run_records("hold", 2, "--lot", "--reason", "a complaint").output
+    held = run_records("hold", 2, "--inspection", "--reason", "a complaint").output
     assert "inspection 2 are retained" in held
     assert held.endswith("stored of it: 0 images (not kept, by the settings of the records)\n")
 
 
 def test_a_backup_while_the_station_writes_is_whole_and_can_be_put_back(
-    opened, scenario, inspected, noise, folder, tmp_path, ask
+    opened, scenario, inspected, noise, folder, tmp_path, run_records
 ):
     copy = tmp_path / "copy"
 
@@ -113,11 +115,11 @@ def test_a_backup_while_the_station_writes_is_whole_and_can_be_put_back(
         return made
 
     made = scenario(steps)
-    assert ask("backup", copy).exception.cause == messages.THERE_ALREADY(path=str(copy))
+    assert run_records("backup", copy).exception.cause == messages.THERE_ALREADY(path=str(copy))
     last = sqlite3.connect(folder / FILE_NAME).execute("SELECT max(sequence) FROM inspections").fetchone()[0]
     shutil.rmtree(folder / "images")
-    said = ask("restore", copy, "--by", "ada")
-    assert f"restored {made.inspections} inspections and {made.images} images" in said.output
+    result = run_records("restore", copy, "--by", "ada")
+    assert f"restored {made.inspections} inspections and {made.images} images" in result.output
     found = check_records(folder)
     assert (found.faults, found.inspections, found.images) == ((), made.inspections, made.images)
     (aside,) = (folder / "aside").iterdir()
@@ -132,7 +134,7 @@ def test_a_backup_while_the_station_writes_is_whole_and_can_be_put_back(
 
 
 def test_a_fruit_that_ran_while_the_backup_was_made_has_no_invented_outcome_after_its_restore(
-    opened, scenario, inspected, noise, folder, tmp_path, ask, trigger, passed
+    opened, scenario, inspected, noise, folder, tmp_path, run_records, trigger, passed
 ):
     async def before():
         async with opened() as records:
@@ -187,7 +189,9 @@ def test_a_backup_that_is_not_whole_is_not_put_back(opened, scenario, inspected,
     assert not (folder / "aside").exists()
 
 
-def test_a_backup_without_a_signature_needs_to_be_trusted(opened, scenario, inspected, noise, folder, tmp_path, ask):
+def test_a_backup_without_a_signature_needs_to_be_trusted(
+    opened, scenario, inspected, noise, folder, tmp_path, run_records
+):
     async def steps():
         async with opened() as records:
             await inspected(records, 1, noise())
@@ -195,17 +199,17 @@ def test_a_backup_without_a_signature_needs_to_be_trusted(opened, scenario, insp
     scenario(steps)
     make_backup(folder, tmp_path / "copy")
     (tmp_path / "copy" / "backup.sig").unlink()
-    said = ask("restore", tmp_path / "copy")
-    assert said.exit_code == 1
-    assert said.exception.cause == messages.BACKUP_UNSIGNED(path=str(tmp_path / "copy"))
-    assert "results that were changed in it are then not found" in str(said.exception)
-    assert "restored 1 inspections and 1 images" in ask("restore", tmp_path / "copy", "--unverified").output
-    assert ask("check").exit_code == 0
+    result = run_records("restore", tmp_path / "copy")
+    assert result.exit_code == 1
+    assert result.exception.cause == messages.BACKUP_UNSIGNED(path=str(tmp_path / "copy"))
+    assert "results that were changed in it are then not found" in str(result.exception)
+    assert "restored 1 inspections and 1 images" in run_records("restore", tmp_path / "copy", "--unverified").output
+    assert run_records("check").exit_code == 0
 
 
 @pytest.mark.parametrize("name", [FILE_NAME, MANIFEST_NAME, "backup.sig", "image"])
 def test_a_backup_whose_file_is_a_device_is_refused_at_once(
-    opened, scenario, inspected, noise, folder, tmp_path, ask, name
+    opened, scenario, inspected, noise, folder, tmp_path, run_records, name
 ):
     async def steps():
         async with opened() as records:
@@ -218,13 +222,13 @@ def test_a_backup_whose_file_is_a_device_is_refused_at_once(
         (path,) = (tmp_path / "copy" / "images").glob("*/*.png")
     path.unlink()
     path.symlink_to("/dev/zero")
-    said = ask("restore", tmp_path / "copy")
-    assert said.exit_code == 1
-    assert "this is no file, or larger than" in str(said.exception)
+    result = run_records("restore", tmp_path / "copy")
+    assert result.exit_code == 1
+    assert "this is no file, or larger than" in str(result.exception)
 
 
 def test_images_that_a_backup_could_not_copy_are_lost_after_its_restore(
-    opened, scenario, inspected, noise, folder, tmp_path, ask
+    opened, scenario, inspected, noise, folder, tmp_path, run_records
 ):
     async def steps():
         async with opened() as records:
@@ -233,10 +237,10 @@ def test_images_that_a_backup_could_not_copy_are_lost_after_its_restore(
 
     scenario(steps)
     (next((folder / "images").glob("*/*.png"))).unlink()
-    assert "note: 1 images were removed or missing" in ask("backup", tmp_path / "copy").output
-    assert "restored 2 inspections and 1 images" in ask("restore", tmp_path / "copy").output
-    assert ask("check").exit_code == 0
-    assert "1 of their files are missing" in ask("show", 1).output + ask("show", 2).output
+    assert "note: 1 images were removed or missing" in run_records("backup", tmp_path / "copy").output
+    assert "restored 2 inspections and 1 images" in run_records("restore", tmp_path / "copy").output
+    assert run_records("check").exit_code == 0
+    assert "1 of their files are missing" in run_records("show", 1).output + run_records("show", 2).output
 
 
 def test_a_backup_needs_its_space_and_leaves_nothing_half_made(opened, scenario, inspected, noise, folder, small_disk):
@@ -254,7 +258,7 @@ def test_a_backup_needs_its_space_and_leaves_nothing_half_made(opened, scenario,
 
 
 def test_a_backup_on_the_records_own_disk_leaves_the_station_its_reserve(
-    opened, scenario, inspected, noise, folder, tmp_path, ask, monkeypatch
+    opened, scenario, inspected, noise, folder, tmp_path, run_records, monkeypatch
 ):
     async def steps():
         async with opened() as records:
@@ -262,14 +266,14 @@ def test_a_backup_on_the_records_own_disk_leaves_the_station_its_reserve(
 
     scenario(steps)
     monkeypatch.setenv("STATION_RECORDS_FREE_RESERVE_MB", "1000000")
-    refused = ask("backup", tmp_path / "copy")
+    refused = run_records("backup", tmp_path / "copy")
     assert refused.exit_code == 1
     assert "the reserve that the station needs" in str(refused.exception)
     assert not (tmp_path / "copy").exists()
 
 
 def test_a_restore_leaves_the_station_its_reserve(
-    opened, scenario, inspected, noise, folder, tmp_path, ask, monkeypatch
+    opened, scenario, inspected, noise, folder, tmp_path, run_records, monkeypatch
 ):
     async def steps():
         async with opened() as records:
@@ -278,7 +282,7 @@ def test_a_restore_leaves_the_station_its_reserve(
     scenario(steps)
     make_backup(folder, tmp_path / "copy")
     monkeypatch.setenv("STATION_RECORDS_FREE_RESERVE_MB", "1000000")
-    refused = ask("restore", tmp_path / "copy")
+    refused = run_records("restore", tmp_path / "copy")
     assert isinstance(refused.exception, DiskFullError)
     assert "the reserve that the station needs" in str(refused.exception)
     assert not (folder / "restoring").exists()
@@ -312,7 +316,7 @@ def test_a_restore_that_fails_leaves_no_half_copy_and_a_start_removes_one_that_w
 
 
 def test_a_check_finds_what_is_wrong_and_the_next_start_reconciles(
-    opened, scenario, inspected, noise, folder, ask, trigger
+    opened, scenario, inspected, noise, folder, run_records, trigger
 ):
     async def steps():
         async with opened() as records:
@@ -320,15 +324,15 @@ def test_a_check_finds_what_is_wrong_and_the_next_start_reconciles(
                 await inspected(records, 1, noise())
 
     scenario(steps)
-    assert "3 inspections and 3 images checked" in ask("check").output
+    assert "3 inspections and 3 images checked" in run_records("check").output
     first, second, _ = (folder / "images" / name[:2] / f"{name}.png" for name in names(folder))
     second.write_bytes(b"something else")
     first.rename(first.with_stem("f" * 64))
-    said = ask("check")
-    assert said.exit_code == 1
-    assert f"fault: {first}: missing, though an inspection refers to it" in said.output
-    assert f"fault: {second}: its content is not what its name says" in said.output
-    assert "note: 1 image files belong to no inspection" in said.output
+    result = run_records("check")
+    assert result.exit_code == 1
+    assert f"fault: {first}: missing, though an inspection refers to it" in result.output
+    assert f"fault: {second}: its content is not what its name says" in result.output
+    assert "note: 1 image files belong to no inspection" in result.output
 
     missing = messages.IMAGES_DROPPED(cause=messages.FILES_MISSING(number=1))
 

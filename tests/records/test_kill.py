@@ -19,16 +19,16 @@ from station.records.model import CurvePoint, Image, InspectionRecord, RecipeSna
 from station.records.records import Records
 from station.settings.records import RecordsSettings
 
-def say(*words):
+def report(*words):
     os.write(1, (json.dumps(words) + "\\n").encode())  # at once, or not at all
 
 async def fruit(records, trigger, record):
     sequence = await records.begin(trigger)
-    say("begun", sequence)
+    report("begun", sequence)
     outcome = await records.conclude(sequence, record)
-    say("concluded", sequence)
+    report("concluded", sequence)
     await records.published(outcome)
-    say("published", sequence)
+    report("published", sequence)
 
 async def main():
     settings = RecordsSettings(deadline_s=30.0, free_reserve_mb=1)
@@ -44,33 +44,33 @@ async def main():
 for go in sys.stdin:  # what is imported once serves all rounds
     station = os.fork()
     if station == 0:
-        say("started", os.getpid())
+        report("started", os.getpid())
         asyncio.run(main())
     os.waitpid(station, 0)
-    say("ended", station)
+    report("ended", station)
 """
 ROUNDS = 6
 
 
 def test_a_killed_station_keeps_every_begun_inspection(opened, scenario, folder, trigger):
-    told: dict[str, list[int]] = {"begun": [], "concluded": [], "published": []}
+    reported: dict[str, list[int]] = {"begun": [], "concluded": [], "published": []}
     with subprocess.Popen([sys.executable, "-c", WRITER, folder], stdin=-1, stdout=-1, text=True) as nursery:
         for _ in range(ROUNDS):
             for word, sequence in _written_until_killed(nursery, after_lines=random.randint(1, 30)):
-                told[word].append(sequence)
-    assert len(told["begun"]) == len(set(told["begun"])), "no number twice"
+                reported[word].append(sequence)
+    assert len(reported["begun"]) == len(set(reported["begun"])), "no number twice"
 
     async def steps():
         async with opened() as records:
             was_open = await records.open_inspections()
             assert was_open.running == ()
             ended = {outcome.sequence: outcome for outcome in was_open.ended}
-            assert set(told["begun"]) <= set(ended), "every begun one is found"
-            for sequence in told["published"]:
-                assert ended[sequence].reasons == ("no_contact",), "what the PLC was told stands"
-            for sequence in set(told["concluded"]) - set(told["published"]):
+            assert set(reported["begun"]) <= set(ended), "every started inspection is found"
+            for sequence in reported["published"]:
+                assert ended[sequence].reasons == ("no_contact",), "the outcome that the PLC received remains"
+            for sequence in set(reported["concluded"]) - set(reported["published"]):
                 full = read_record(records, sequence)
-                assert full.judged is not None, "what was concluded is kept"
+                assert full.judged is not None, "what was concluded is stored"
                 assert len(full.judged.curve) == 8
             for sequence in ended:
                 for image in read_record(records, sequence).images:
@@ -98,7 +98,7 @@ def _written_until_killed(nursery, after_lines):
         if len(lines) == after_lines:
             killer = threading.Timer(random.uniform(0, 0.02), os.kill, (station, signal.SIGKILL))
             killer.start()
-    assert killer is not None, "it said too little"
+    assert killer is not None, "it wrote too few lines"
     killer.join()
     return lines
 
@@ -110,7 +110,7 @@ def test_a_station_killed_at_random_moments_keeps_all_that_it_acknowledged():
         [sys.executable, program, "--rounds", "8", "--json"], capture_output=True, text=True, timeout=110, check=False
     )
     assert done.stdout, done.stderr[-2000:]
-    said = json.loads(done.stdout)
-    assert said["told"]["begun"] > 0
-    assert {what: number for what, number in said["wrong"].items() if number} == {}
-    assert len(said["wrong"]) == 12
+    report = json.loads(done.stdout)
+    assert report["told"]["begun"] > 0
+    assert {what: number for what, number in report["wrong"].items() if number} == {}
+    assert len(report["wrong"]) == 12

@@ -29,7 +29,7 @@ def test_a_trigger_goes_its_way_from_begin_to_acknowledged(opened, scenario, tri
             assert (outcome.trigger_id, outcome.encoder, outcome.lot) == (7, 1234, "A-17")
             assert (outcome.recipe_number, outcome.recipe_checksum) == (1, trigger.recipe.checksum)
             assert (await records.open_inspections()).ended == (outcome,)
-            assert await records.acknowledged(sequence) == 0, "what the PLC was not told it cannot have taken"
+            assert await records.acknowledged(sequence) == 0, "the PLC cannot have taken what was not published to it"
             assert await records.published(outcome)
             assert not await records.published(outcome)
             assert await records.acknowledged(sequence) == 1
@@ -82,13 +82,13 @@ def test_the_first_conclusion_stands(opened, scenario, trigger, passed, failed):
     scenario(steps)
 
 
-@pytest.mark.parametrize("told_first", [True, False])
-def test_what_the_plc_was_told_overrules_what_was_judged(opened, scenario, trigger, passed, told_first):
+@pytest.mark.parametrize("published_first", [True, False])
+def test_what_the_plc_was_told_overrules_what_was_judged(opened, scenario, trigger, passed, published_first):
     async def steps():
         async with opened() as records:
             sequence = await records.begin(trigger)
-            judged = None if told_first else await records.conclude(sequence, passed)
-            told = Outcome(
+            judged = None if published_first else await records.conclude(sequence, passed)
+            outcome = Outcome(
                 **dict[str, Any](
                     {
                         **(judged.model_dump() if judged else _bare(sequence)),
@@ -98,13 +98,13 @@ def test_what_the_plc_was_told_overrules_what_was_judged(opened, scenario, trigg
                     }
                 )
             )
-            assert await records.published(told)
-            if told_first:
-                assert await records.conclude(sequence, passed) == told
-            assert (await records.open_inspections()).ended == (told,)
+            assert await records.published(outcome)
+            if published_first:
+                assert await records.conclude(sequence, passed) == outcome
+            assert (await records.open_inspections()).ended == (outcome,)
             full = read_record(records, sequence)
-            assert full.standing == told
-            assert full.judged == passed, "what was judged is kept beside it"
+            assert full.standing == outcome
+            assert full.judged == passed, "the judged outcome is stored beside it"
 
     scenario(steps)
 
@@ -129,21 +129,21 @@ def _bare(sequence: int) -> dict[str, Any]:
     }
 
 
-def _told(sequence: int) -> Outcome:
-    told: dict[str, Any] = {"outcome": "NO_RESULT", "reasons": (Reason.STATION_LOST,), "late": False}
-    return Outcome(**(_bare(sequence) | told))
+def _station_lost(sequence: int) -> Outcome:
+    fields: dict[str, Any] = {"outcome": "NO_RESULT", "reasons": (Reason.STATION_LOST,), "late": False}
+    return Outcome(**(_bare(sequence) | fields))
 
 
 def test_a_restart_ends_what_was_not_surely_delivered(opened, scenario, trigger, passed, failed):
     async def steps():
         async with opened() as records:
             sized = replace(trigger, fruit_length_mm_x10=483, size_class=3)
-            running, judged, told, taken = [await records.begin(sized) for _ in range(4)]
+            running, judged, published, acknowledged = [await records.begin(sized) for _ in range(4)]
             await records.conclude(judged, passed)
-            for sequence in (told, taken):
+            for sequence in (published, acknowledged):
                 await records.published(await records.conclude(sequence, failed))
             with sqlite3.connect(records.folder / "records.sqlite3") as other:
-                other.execute("UPDATE inspections SET acknowledged_utc_ms = 1 WHERE sequence = ?", (taken,))
+                other.execute("UPDATE inspections SET acknowledged_utc_ms = 1 WHERE sequence = ?", (acknowledged,))
             other.close()
         async with opened() as records:
             assert records.lost == (running, judged)
@@ -153,13 +153,13 @@ def test_a_restart_ends_what_was_not_surely_delivered(opened, scenario, trigger,
             assert [(outcome.sequence, outcome.outcome) for outcome in was_open.ended] == [
                 (running, "NO_RESULT"),
                 (judged, "NO_RESULT"),
-                (told, "FAIL"),
+                (published, "FAIL"),
             ]
             assert was_open.ended[0].reasons == was_open.ended[1].reasons == (Reason.STATION_LOST,)
             assert was_open.ended[0].partial
             assert read_record(records, judged).judged == passed
             assert read_record(records, running).judged is None
-            # the interface outlived the station, and had shown the outcome just before: that stands
+            # the interface outlived the station, and had shown the outcome just before: that one remains
             shown = Outcome(**dict[str, Any]({**was_open.ended[1].model_dump(), "outcome": "PASS", "reasons": ()}))
             assert await records.published(shown)
             assert read_record(records, judged).standing == shown
@@ -170,7 +170,7 @@ def test_a_restart_ends_what_was_not_surely_delivered(opened, scenario, trigger,
 def test_an_unknown_inspection_is_refused(opened, scenario, passed, trigger):
     async def steps():
         async with opened() as records:
-            for request in (records.conclude(1, passed), records.published(_told(1))):
+            for request in (records.conclude(1, passed), records.published(_station_lost(1))):
                 with pytest.raises(UnknownInspectionError):
                     await request
             with pytest.raises(UnknownInspectionError):
@@ -308,7 +308,7 @@ def test_closed_records_refuse_in_words(opened, scenario, trigger):
 @settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(
-        st.tuples(st.sampled_from(["begin", "pass", "fail", "tell", "take", "restart"]), st.integers(0, 5)),
+        st.tuples(st.sampled_from(["begin", "pass", "fail", "publish", "take", "restart"]), st.integers(0, 5)),
         min_size=5,
         max_size=25,
     )
@@ -316,7 +316,7 @@ def test_closed_records_refuse_in_words(opened, scenario, trigger):
 def test_any_history_has_one_outcome_for_each_trigger(  # noqa: C901 (a model and its steps)
     opened, scenario, tmp_path, trigger, passed, failed, history
 ):
-    """The records against a model of the contract: sequence to (judged, standing, told, taken)."""
+    """The records against a model of the contract: sequence to (judged, standing, published, acknowledged)."""
     folder = tmp_path / f"{abs(hash(tuple(history)))}-{len(list(tmp_path.iterdir()))}"
     model: dict[int, list] = {}
 
@@ -352,12 +352,12 @@ def test_any_history_has_one_outcome_for_each_trigger(  # noqa: C901 (a model an
         row = model[sequence]
         if verb in {"pass", "fail"}:
             record = passed if verb == "pass" else failed
-            stands = await records.conclude(sequence, record)
+            standing = await records.conclude(sequence, record)
             if row[0] is None:
                 row[0], row[1] = record.outcome, row[1] or record.outcome
-            assert stands.outcome == row[1]
-        elif verb == "tell":
-            assert await records.published(_told(sequence)) is not row[2]
+            assert standing.outcome == row[1]
+        elif verb == "publish":
+            assert await records.published(_station_lost(sequence)) is not row[2]
             if not row[2]:
                 row[1], row[2] = "NO_RESULT", True
         elif verb == "take":

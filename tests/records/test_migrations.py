@@ -1,4 +1,4 @@
-"""A database of any earlier form is brought up to date with a copy kept, and a newer one is left alone."""
+"""Migrations: a database of any earlier schema version is migrated, with a backup copy; a newer one is not changed."""
 
 import csv
 import json
@@ -96,7 +96,7 @@ def test_an_earlier_form_is_brought_up_to_date_with_a_copy_kept(opened, scenario
     scenario(steps)
 
 
-def test_records_from_before_the_second_witness_read_without_it(opened, scenario, folder, trigger, passed, ask):
+def test_records_from_before_the_second_witness_read_without_it(opened, scenario, folder, trigger, passed, run_records):
     with_witness = tuple(
         replace(point, changed_area_mm2=9.5 * point.step, changed_area_px=13_000 * point.step) for point in passed.curve
     )
@@ -125,16 +125,16 @@ def test_records_from_before_the_second_witness_read_without_it(opened, scenario
     assert new == with_witness
     (backup,) = (folder / "backups").iterdir()
     assert backup.name.endswith("-form-0005.sqlite3")
-    assert "changed mm²" in ask("show", 1).output
-    last = ask("show", 2).output.split("changed mm²")[1].splitlines()[5].split()
+    assert "changed mm²" in run_records("show", 1).output
+    last = run_records("show", 2).output.split("changed mm²")[1].splitlines()[5].split()
     assert last == ["4", "26.00", "4.00", "32.0", "44000", "38.0", "52000", "0.90", "-"]
-    ask("export", folder / "all.csv")
+    run_records("export", folder / "all.csv")
     with (folder / "all.csv").open(newline="", encoding="utf-8") as file:
         exported = [json.loads(row["changed_areas_mm2"]) for row in csv.DictReader(file)]
     assert exported == [[None] * 5, [0.0, 9.5, 19.0, 28.5, 38.0]]
 
 
-def test_records_from_before_the_fruits_size_read_without_it(opened, scenario, folder, trigger, passed, ask):
+def test_records_from_before_the_fruits_size_read_without_it(opened, scenario, folder, trigger, passed, run_records):
     sized = replace(trigger, fruit_length_mm_x10=483, size_class=3)
 
     async def steps():
@@ -158,9 +158,9 @@ def test_records_from_before_the_fruits_size_read_without_it(opened, scenario, f
     assert (old.trigger, old.trigger.size) == (trigger, FruitSize())
     assert (new.trigger, new.trigger.size) == (sized, FruitSize(48.3, 3))
     assert [(one.standing.fruit_length_mm_x10, one.standing.size_class) for one in (old, new)] == [(0, 0), (483, 3)]
-    assert "size:         not given by the PLC\n" in ask("show", 1).output
-    assert "size:         fruit length 48.3 mm, class 3 (given by the PLC)\n" in ask("show", 2).output
-    ask("export", folder / "all.csv")
+    assert "size:         not given by the PLC\n" in run_records("show", 1).output
+    assert "size:         fruit length 48.3 mm, class 3 (given by the PLC)\n" in run_records("show", 2).output
+    run_records("export", folder / "all.csv")
     with (folder / "all.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     added = ["fruit_length_mm", "size_class", "recipe_revision", "fruit_width_mm"]
@@ -168,7 +168,7 @@ def test_records_from_before_the_fruits_size_read_without_it(opened, scenario, f
     assert [(row["fruit_length_mm"], row["size_class"]) for row in rows] == [("", ""), ("48.3", "3")]
 
 
-def test_records_from_before_messages_read_with_their_sentences(opened, scenario, folder, trigger, failed, ask):
+def test_records_from_before_messages_read_with_their_sentences(opened, scenario, folder, trigger, failed, run_records):
     area = (
         "The area at 4 mm of closing is at least 170.0 mm²; the limit for a strawberry of 40 mm is 165 mm²: it is over."
     )
@@ -203,10 +203,10 @@ def test_records_from_before_messages_read_with_their_sentences(opened, scenario
         now.explanation, now.judgement, now.first_press_findings, now.measures
     )  # fmt: skip
     for sequence, each in ((1, old), (2, new)):
-        said = ask("show", sequence).output
+        output = run_records("show", sequence).output
         for message in (*each.explanation, each.judgement, each.first_press_findings):
-            assert str(message) in said
-        assert "judge." not in said
+            assert str(message) in output
+        assert "judge." not in output
     batch = read_batch(folder, "one", 0).events
     events = {event.data["sequence"]: event.data for event in batch if event.kind == "inspection"}
     assert events[1]["explanation"] == [area]

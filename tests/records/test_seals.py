@@ -45,7 +45,7 @@ def trail(connection):
 
 
 def test_what_the_station_does_itself_is_no_fault(
-    opened, scenario, folder, trigger, passed, failed, noise, settled, ask
+    opened, scenario, folder, trigger, passed, failed, noise, settled, run_records
 ):
     """Images make room, an outcome is another one than was judged, a trigger is withdrawn, a start ends what ran."""
 
@@ -63,20 +63,20 @@ def test_what_the_station_does_itself_is_no_fault(
             await asyncio.sleep(0)
             gone.cancel()
             await records.begin(trigger)
-            said = await asyncio.to_thread(ask, "check")
-            assert (said.exit_code, "fault" in said.output) == (0, False), said.output
+            result = await asyncio.to_thread(run_records, "check")
+            assert (result.exit_code, "fault" in result.output) == (0, False), result.output
         async with opened() as records:
             assert len(records.lost) == 1
             await records.acknowledged(7)
 
     scenario(steps)
-    said = ask("check")
-    assert said.exit_code == 0, said.output
-    assert "note" not in said.output
+    result = run_records("check")
+    assert result.exit_code == 0, result.output
+    assert "note" not in result.output
 
 
 def test_inspections_of_before_the_seals_are_noted_and_later_ones_sealed(
-    opened, scenario, folder, trigger, passed, ask
+    opened, scenario, folder, trigger, passed, run_records
 ):
     async def inspect(number):
         async with opened() as records:
@@ -103,22 +103,22 @@ def test_inspections_of_before_the_seals_are_noted_and_later_ones_sealed(
     connection.close()
     for name in ("audit_head", "signing_key.pem", "public_key.pem"):
         (folder / name).unlink()
-    said = ask("check")
-    assert said.exit_code == 0, said.output
-    assert "note: none of 2 inspections is sealed: they are of an earlier version" in said.output
+    result = run_records("check")
+    assert result.exit_code == 0, result.output
+    assert "note: none of 2 inspections is sealed: they are of an earlier version" in result.output
     scenario(lambda: inspect(1))
-    said = ask("check")
-    assert said.exit_code == 0, said.output
-    assert "note: inspection 2 is missing, of before the seals" in said.output
-    assert "note: 2 inspections up to number 3 are of an earlier version, and not sealed" in said.output
+    result = run_records("check")
+    assert result.exit_code == 0, result.output
+    assert "note: inspection 2 is missing, of before the seals" in result.output
+    assert "note: 2 inspections up to number 3 are of an earlier version, and not sealed" in result.output
     connection = sqlite3.connect(folder / FILE_NAME)
     connection.execute("UPDATE inspections SET area_mm2 = 1 WHERE sequence = 4")
     connection.commit()
     connection.close()
-    assert "fault: inspection 4: record changed" in ask("check").output
+    assert "fault: inspection 4: record changed" in run_records("check").output
 
 
-def test_an_inspection_that_the_station_did_not_make_is_found(opened, scenario, folder, trigger, passed, ask):
+def test_an_inspection_that_the_station_did_not_make_is_found(opened, scenario, folder, trigger, passed, run_records):
     async def steps():
         async with opened() as records:
             await records.published(await records.conclude(await records.begin(trigger), passed))
@@ -130,12 +130,14 @@ def test_an_inspection_that_the_station_did_not_make_is_found(opened, scenario, 
     connection.execute(f"INSERT INTO inspections (sequence, {names}) SELECT 2, {names} FROM inspections")
     connection.commit()
     connection.close()
-    said = ask("check").output
-    assert "fault: inspection 2: record not sealed" in said
-    assert "fault: inspection 2: outcome not sealed" in said
+    output = run_records("check").output
+    assert "fault: inspection 2: record not sealed" in output
+    assert "fault: inspection 2: outcome not sealed" in output
 
 
-def test_rows_that_a_killed_station_did_not_sign_are_noted_by_the_next_start(opened, scenario, folder, trigger, ask):
+def test_rows_that_a_killed_station_did_not_sign_are_noted_by_the_next_start(
+    opened, scenario, folder, trigger, run_records
+):
     async def steps(number):
         async with opened() as records:
             for _ in range(number):
@@ -145,13 +147,13 @@ def test_rows_that_a_killed_station_did_not_sign_are_noted_by_the_next_start(ope
     before = (folder / "audit_head").read_bytes()
     scenario(lambda: steps(0))  # ends the inspection that ran, and seals its outcome
     (folder / "audit_head").write_bytes(before)
-    said = ask("check")
-    assert said.exit_code == 1
-    assert "the signed head does not name them" in said.output
+    result = run_records("check")
+    assert result.exit_code == 1
+    assert "the signed head does not name them" in result.output
     scenario(lambda: steps(0))
-    said = ask("check")
-    assert said.exit_code == 0, said.output
-    assert "without a signed head, as a killed station leaves" in said.output
+    result = run_records("check")
+    assert result.exit_code == 0, result.output
+    assert "without a signed head, as a killed station leaves" in result.output
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Whatever is asked for, a page is what a look at every inspection would give."""
+"""Search: for any conditions, a page has what a check of every inspection would find."""
 
 import tempfile
 from dataclasses import replace
@@ -52,7 +52,7 @@ def snapshot(fruit):
 
 
 def wanted(inspected, query):
-    """By looking at every one."""
+    """By a check of every one."""
     found = []
     for sequence, (lot, hour, end, fruit) in enumerate(inspected, start=1):
         began_utc_ms, (outcome, reasons) = hour * HOUR_MS + sequence, end or (None, ())
@@ -108,8 +108,8 @@ def test_an_outcome_told_otherwise_is_found_by_what_was_told(opened, scenario, f
         async with opened() as records:
             sequence = await records.begin(trigger)
             judged = await records.conclude(sequence, failed)
-            told = judged.model_copy(update={"outcome": "NO_RESULT", "reasons": (Reason.CALLED_OFF,)})
-            await records.published(told)
+            outcome = judged.model_copy(update={"outcome": "NO_RESULT", "reasons": (Reason.CALLED_OFF,)})
+            await records.published(outcome)
 
     scenario(steps)
     with reading(folder) as connection:
@@ -119,7 +119,7 @@ def test_an_outcome_told_otherwise_is_found_by_what_was_told(opened, scenario, f
 
 
 def test_an_inspection_known_by_its_outcome_alone_is_found_by_its_time(opened, scenario, folder, trigger, passed):
-    """It lies before others that were begun in other hours."""
+    """It comes before others that began in other hours."""
 
     async def steps():
         async with opened() as records:
@@ -149,35 +149,35 @@ def test_a_page_is_of_some_size(opened, scenario, folder):
         find_page(connection, Query(), 1001)
 
 
-def test_the_command_finds_by_what_was_told_of_lots(opened, scenario, folder, ask, trigger, passed, failed):
+def test_the_command_finds_by_what_was_told_of_lots(opened, scenario, folder, run_records, trigger, passed, failed):
     async def steps():
         async with opened() as records:
             for number in range(4):
                 lot = "west" if number < 2 else "east"
                 sequence = await records.begin(replace(trigger, lot=lot))
                 await records.published(await records.conclude(sequence, failed if number % 2 else passed))
-            said = ask("lot", "start", "west", "--grower", "Meier", "--by", "ada")  # while the station runs
-            assert said.output.startswith("west: Meier, began ")
+            result = run_records("lot", "start", "west", "--grower", "Meier", "--by", "ada")  # while the station runs
+            assert result.output.startswith("west: Meier, began ")
 
     scenario(steps)
-    said = ask("list", "--grower", "Meier", "--reason", "early_stop")
-    assert [line.split()[0] for line in said.output.splitlines()] == ["number", "2"]
-    assert " west  Meier   strawberry  FAIL " in said.output
-    assert "more: --below 4" in ask("list", "--last", 1).output
-    assert [line.split()[0] for line in ask("list", "--below", 4, "--last", 2).output.splitlines()[:3]] == [
+    result = run_records("list", "--grower", "Meier", "--reason", "early_stop")
+    assert [line.split()[0] for line in result.output.splitlines()] == ["number", "2"]
+    assert " west  Meier   strawberry  FAIL " in result.output
+    assert "more: --below 4" in run_records("list", "--last", 1).output
+    assert [line.split()[0] for line in run_records("list", "--below", 4, "--last", 2).output.splitlines()[:3]] == [
         "number",
         "3",
         "2",
     ]
-    assert len(ask("list", "--from", "2023-11-14T22:13:20", "--to", "2023-11-15").output.splitlines()) == 5
-    refused = ask("list", "--from", "yesterday")
+    assert len(run_records("list", "--from", "2023-11-14T22:13:20", "--to", "2023-11-15").output.splitlines()) == 5
+    refused = run_records("list", "--from", "yesterday")
     assert refused.exit_code == 2
     assert "write 2026-06-30" in refused.output
-    other = ask("lot", "start", "west", "--grower", "Huber")
+    other = run_records("lot", "start", "west", "--grower", "Huber")
     assert other.exception.cause.id == messages.ANOTHER_GROWER.id
     assert other.exception.cause.parameters["known"] == "Meier"
-    assert ask("lot", "start", "west", "--grower", "Huber", "--correct", "--by", "ada").exit_code == 0
-    assert ask("lot", "end", "west").output.startswith("west: Huber, began")
+    assert run_records("lot", "start", "west", "--grower", "Huber", "--correct", "--by", "ada").exit_code == 0
+    assert run_records("lot", "end", "west").output.startswith("west: Huber, began")
     with short_transaction(folder) as connection:
         (lot,) = read_lots(connection, 9)
         assert end_lot(connection, "west", IDA) == lot, "a lot ends once"

@@ -2,7 +2,7 @@
 
 from benchmarks.reliability.flaky import Round, failures, played, timing_bound
 from benchmarks.reliability.together import STATIONS
-from tests.conftest import KEPT
+from tests.conftest import TOGETHER
 
 pytest_plugins = ("pytester",)
 
@@ -38,11 +38,11 @@ def test_what_reads_a_clock_or_waits_is_timing_bound_and_a_sum_is_not(tmp_path):
 def test_a_failure_is_open_until_a_round_has_passed_since():
     rounds = [played_with(1, "a::one", "b::two"), played_with(2, "a::one"), played_with(3)]
     assert failures(rounds)[2:] == ["| `a::one` | 2 | 1, 2 | 1 |", "| `b::two` | 1 | 1 | 2 |"]
-    said = " ".join(played(rounds, 100, "2 cores"))
-    assert "**3** of the 100 rounds" in said
-    assert "passed in 1." in said
-    assert "900 runs of a test in all, of which   3 failed" in said
-    assert "load 7.0 to 9.0" in said
+    text = " ".join(played(rounds, 100, "2 cores"))
+    assert "**3** of the 100 rounds" in text
+    assert "passed in 1." in text
+    assert "900 runs of a test in all, of which   3 failed" in text
+    assert "load 7.0 to 9.0" in text
 
 
 def test_tests_that_share_a_station_run_in_few_workers_and_others_in_any(pytester):
@@ -54,14 +54,15 @@ def test_tests_that_share_a_station_run_in_few_workers_and_others_in_any(pyteste
                 f"import os\ndef test_it():\n    print('{folder} by', os.environ['PYTEST_XDIST_WORKER'])\n"
             )
     options = ("-n", "5", "-rP", "-p", "no:cacheprovider", "-p", "benchmarks.reliability.together", "tests")
-    said = pytester.runpytest_subprocess(*options)
-    said.assert_outcomes(passed=18)
+    result = pytester.runpytest_subprocess(*options)
+    result.assert_outcomes(passed=18)
     by = {
-        folder: {line for line in said.outlines if line.startswith(f"{folder} by")} for folder in (*STATIONS, "records")
+        folder: {line for line in result.outlines if line.startswith(f"{folder} by")}
+        for folder in (*STATIONS, "records")
     }
     assert len(by.pop("records")) > 1
     assert {folder: len(lines) for folder, lines in by.items()} == STATIONS
 
 
 def test_folders_of_a_station_are_those_that_a_whole_run_keeps_together():
-    assert {(folder,) for folder in STATIONS} <= set(KEPT)
+    assert {(folder,) for folder in STATIONS} <= set(TOGETHER)

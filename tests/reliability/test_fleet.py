@@ -24,21 +24,21 @@ def test_books_that_agree_have_no_difference_and_each_other_one_is_named():
     right = cell(Decision.PASS, Decision.FAIL)
     own, arrived, counted = {1: "PASS", 2: "FAIL"}, [(2, "FAIL"), (1, "PASS")], {"PASS": 1, "FAIL": 1}
     assert stations.disagreements(right, own, arrived, counted, 2) == []
-    (said,) = stations.disagreements(right, own, arrived[:1], counted, 2)
-    assert "PostgreSQL has [(2, 'FAIL')]" in said
-    (said,) = stations.disagreements(right, own, [*arrived, (1, "PASS")], counted, 2)
-    assert "PostgreSQL has" in said, "one that is there twice"
-    (said,) = stations.disagreements(right, own, arrived, {"PASS": 2, "FAIL": 1}, 2)
-    assert "Prometheus counts" in said
-    (said,) = stations.disagreements(right, own, arrived, counted, 3)
-    assert "2 of 3 fruit decided" in said
+    (difference,) = stations.disagreements(right, own, arrived[:1], counted, 2)
+    assert "PostgreSQL has [(2, 'FAIL')]" in difference
+    (difference,) = stations.disagreements(right, own, [*arrived, (1, "PASS")], counted, 2)
+    assert "PostgreSQL has" in difference, "one that is there twice"
+    (difference,) = stations.disagreements(right, own, arrived, {"PASS": 2, "FAIL": 1}, 2)
+    assert "Prometheus counts" in difference
+    (difference,) = stations.disagreements(right, own, arrived, counted, 3)
+    assert "2 of 3 fruit decided" in difference
     late = cell(Decision.PASS, Decision.FAIL)
     late.passages[1] = replace(late.passages[1], reasons=("late",))
     assert stations.disagreements(late, own, arrived, counted, 2) == ["station-1: the PLC saw {'late': 1} []"]
     refused = cell(Decision.PASS, Decision.FAIL, Decision.REFUSED)
     refused.passages[2] = replace(refused.passages[2], sequence=0, reasons=("not_ready",))
-    (said,) = stations.disagreements(refused, own, arrived, counted, 3)
-    assert said == "station-1: the PLC saw {'refused': 1} ['refused: not_ready']"
+    (difference,) = stations.disagreements(refused, own, arrived, counted, 3)
+    assert difference == "station-1: the PLC saw {'refused': 1} ['refused: not_ready']"
 
 
 def test_a_run_with_another_number_or_without_a_sample_differs():

@@ -3,10 +3,10 @@
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.reliability.link_kept import NONE_STALE, ONE_OUTCOME, WHOLE_PRESS, Fruit, Kept, Story, read, write
 from benchmarks.reliability.link_laws import of_passage, of_records
 from benchmarks.reliability.link_observer import Observer
 from benchmarks.reliability.link_page import sections_of
+from benchmarks.reliability.link_results import NONE_STALE, ONE_OUTCOME, WHOLE_PRESS, Fruit, Results, Story, read, write
 from plc_interface.plc_simulator.program import Decision, Passage
 from station.channel.line import Outcome
 from station.records.model import CurvePoint, FullRecord, InspectionRecord, Trigger
@@ -74,11 +74,11 @@ def test_stories_are_kept_whole_and_the_page_counts_them(tmp_path: Path):
     story = Story(seed=3, fruits=(Fruit(seed=3, number=1, bruised=False, outcome="PASS"), cut), triggers=2, ended=True)
     write(tmp_path / "kept.json", [story])
     made = read(tmp_path / "kept.json")
-    assert made == Kept(stories=(story,))
+    assert made == Results(stories=(story,))
     sections = sections_of(made, tmp_path / "chart.svg")
     assert f"| {ONE_OUTCOME} | 1 |" in sections["laws"]
     assert "\nStory 3, fruit 2: none came" in sections["laws"]
     (camera,) = (line for line in sections["times"] if line.startswith("| camera"))
     assert camera.split(" | ")[1:3] == ["1", "1"]
-    assert camera.count("0 of 1") == 2, "neither the 250 ms nor the 5 s were kept"
+    assert camera.count("0 of 1") == 2, "neither the 250 ms nor the 5 s were met"
     assert (tmp_path / "chart.svg").stat().st_size > 0

@@ -1,4 +1,4 @@
-"""The mutants of the pure rooms: which changes are made, and what the page says of their fates."""
+"""The mutants of the pure rooms: which changes are made, and what the page reports of their fates."""
 
 import ast
 import gc

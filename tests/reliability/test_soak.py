@@ -1,4 +1,4 @@
-"""The soak's verdicts: what an interval decides, and what the page says of a station that grows or does not."""
+"""The soak's verdicts: what an interval decides, and what the page reports of a station that grows or does not."""
 
 import os
 import subprocess
@@ -89,9 +89,9 @@ def made(
             for name, each in in_use.items()
         }
         removed = max(0, number - images_from)
-        slower, as_begun = 1 + machine * at_s / 3600, 1 + (machine + station) * at_s / 7200
+        slower, as_started = 1 + machine * at_s / 3600, 1 + (machine + station) * at_s / 7200
         ours = slower + station * at_s / 3600
-        own_s, whole_s = 0.1 * number * as_begun, 8.0 * number
+        own_s, whole_s = 0.1 * number * as_started, 8.0 * number
         counts = samples_module.StationCounts(4.0 * number, own_s, whole_s, 9.0 * number, removed, 0)
         latency = samples_module.Latency((200 + number % 7) * ours, (600 + number % 9) * ours, 900)
         bare = samples_module.Latency((100 + number % 5) * slower, (300 + number % 4) * slower, 900)

@@ -36,7 +36,7 @@ BUSY = Story(
 
 
 @pytest.fixture(autouse=True)
-def quiet() -> Iterator[None]:
+def without_logging() -> Iterator[None]:
     logging.disable(logging.CRITICAL)
     yield
     logging.disable(logging.NOTSET)
@@ -115,8 +115,8 @@ def test_the_same_story_gives_the_same_play():
 def test_a_motion_that_no_stop_halts_is_found(monkeypatch: pytest.MonkeyPatch):
     for state in UNJUDGED:
         row = TABLE[state, Event.PROTECTIVE_STOP]
-        kept = tuple(action for action in row.actions if action is not Action.HALT)
-        monkeypatch.setitem(TABLE, (state, Event.PROTECTIVE_STOP), Transition(row.state, kept))
+        others = tuple(action for action in row.actions if action is not Action.HALT)
+        monkeypatch.setitem(TABLE, (state, Event.PROTECTIVE_STOP), Transition(row.state, others))
     least = found(laws.NOTHING_MOVES)
     assert len(least.troubles) <= 2
     assert "arm protective_stop" in {trouble.name for trouble in least.troubles}

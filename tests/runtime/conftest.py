@@ -93,9 +93,9 @@ class LineClient:
     async def inspect(self) -> Outcome:
         """One fruit, from a ready station to an acknowledged outcome."""
         await self.ready()
-        begun = await self.begin()
-        assert begun.refusal is None, await self.state()
-        outcome = await self.outcome(begun.sequence)
+        reply = await self.begin()
+        assert reply.refusal is None, await self.state()
+        outcome = await self.outcome(reply.sequence)
         await self.publish(outcome)
         return outcome
 
@@ -124,16 +124,16 @@ class Bench:
         assert service is not None
         entered = service.entered
 
-        def told(state: State, after: State, took_s: float) -> None:
+        def entered_once(state: State, after: State, took_s: float) -> None:
             entered(state, after, took_s)
             if state is phase:
                 service.entered = entered
                 do()
 
-        service.entered = told
+        service.entered = entered_once
 
     async def until(self, is_so: Callable[[], Any], patience_s: float = PATIENCE_S) -> None:
-        """Wait until something is so; a failure says what the station was at meanwhile."""
+        """Wait until something is so; a failure reports the station's state meanwhile."""
         try:
             await until(is_so, patience_s)
         except AssertionError as error:
@@ -151,7 +151,7 @@ class Bench:
                 await reached.wait()
 
     async def choose(self, kind: str) -> None:
-        """A ready station with a recipe; on a bench a person first says that the jaws are clear."""
+        """A ready station with a recipe; on a bench a person first confirms that the jaws are clear."""
         self.twin.world.remove()
         await until(lambda: self.phase in {State.UNKNOWN, State.HELD, State.IDLE})
         done = await self.line.order(CommandName.RESET)
@@ -282,7 +282,7 @@ def at_ball(
         values["imaging"]["frames_per_step"] = 1
         (tmp_path / "recipes" / "rubber_ball.yaml").write_text(json.dumps(values))
         async with bench(file) as cell:
-            await cell.line.order(CommandName.RESET)  # on a bench a person first says that the jaws are clear
+            await cell.line.order(CommandName.RESET)  # on a bench a person first confirms that the jaws are clear
             await cell.until(lambda: cell.phase is State.IDLE, patience_s=150)
             cell.lay("rubber_ball")
             assert (await cell.line.order(CommandName.SET_MODE, MANUAL)).done

@@ -32,8 +32,8 @@ def test_a_broken_configuration_is_replaced_by_its_last_good_form(settings_file,
 
 def test_a_broken_recipe_is_replaced_by_its_last_good_form_and_a_removed_one_is_gone(settings_file, tmp_path):
     settings_file()
-    folder, kept = tmp_path / "recipes", StateFiles(tmp_path / "home")
-    book = ActiveRecipes(folder, kept)
+    folder, state_files = tmp_path / "recipes", StateFiles(tmp_path / "home")
+    book = ActiveRecipes(folder, state_files)
     book.read()
     assert book.numbers == (1, 2, 3)
     assert book.problems == ()
@@ -43,7 +43,7 @@ def test_a_broken_recipe_is_replaced_by_its_last_good_form_and_a_removed_one_is_
     (folder / "blueberry.yaml").write_text("name: [")
     (folder / "raspberry.yaml").unlink()
 
-    later = ActiveRecipes(folder, kept)
+    later = ActiveRecipes(folder, state_files)
     later.read()
     assert later.numbers == (1, 2)
     assert later.restored() == (blueberry, "LOT 1")
@@ -62,17 +62,17 @@ def test_a_checksum_is_that_of_the_recipe_and_of_nothing_else(settings_file, tmp
 
 
 def test_a_file_is_there_whole_or_not_at_all(tmp_path):
-    kept = StateFiles(tmp_path)
-    assert kept.read("a/b.json") is None
-    assert kept.write("a/b.json", b"first")
+    state_files = StateFiles(tmp_path)
+    assert state_files.read("a/b.json") is None
+    assert state_files.write("a/b.json", b"first")
     before = (tmp_path / "a" / "b.json").stat().st_ino
-    assert kept.write("a/b.json", b"first")
+    assert state_files.write("a/b.json", b"first")
     assert (tmp_path / "a" / "b.json").stat().st_ino == before, "nothing is written where nothing changes"
-    assert kept.write("a/b.json", b"second")
-    assert kept.read("a/b.json") == b"second"
+    assert state_files.write("a/b.json", b"second")
+    assert state_files.read("a/b.json") == b"second"
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["b.json"]
     (tmp_path / "file").write_bytes(b"")
-    assert not kept.write("file/inside", b"x")
+    assert not state_files.write("file/inside", b"x")
 
 
 def test_a_start_whose_records_take_long_to_open_extends_its_limit(bench, tmp_path, monkeypatch):

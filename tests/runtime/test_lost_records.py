@@ -35,7 +35,7 @@ def remove(file):
 
 @pytest.fixture
 def site(tmp_path):
-    """The configuration of a station; nobody is at its devices' addresses."""
+    """The configuration of a station; no device is at its devices' addresses."""
     values = {
         "home": str(tmp_path / "home"),
         "gripper": {"urcap": {"host": "127.0.0.1", "port": 1}},

@@ -117,31 +117,31 @@ async def proven(alarm: AlarmId, pages: Pages, log: io.StringIO) -> Message:
     Returns:
         The detail.
     """
-    said: dict[str, Message] = {}
+    texts: dict[str, Message] = {}
     page = ""
     with contextlib.suppress(TimeoutError):
         async with asyncio.timeout(60):
-            while not said or not all(german(each) in page for each in said.values()):
+            while not texts or not all(german(each) in page for each in texts.values()):
                 if data := await pages.alarm(alarm):
-                    said = {part: read(data[part]) for part in ("cause", "consequence", "action", "detail")}
-                    assert data["detail"]["text"] == str(said["detail"])
+                    texts = {part: read(data[part]) for part in ("cause", "consequence", "action", "detail")}
+                    assert data["detail"]["text"] == str(texts["detail"])
                     page = await pages.text(f"/alarms/{alarm}")
                 await asyncio.sleep(0.05)
-    assert [part for part, each in said.items() if german(each) not in page] == [], page
-    assert said["cause"].id == f"alarm.cause.{alarm}"
+    assert [part for part, each in texts.items() if german(each) not in page] == [], page
+    assert texts["cause"].id == f"alarm.cause.{alarm}"
 
     raised = [line for line in map(json.loads, log.getvalue().splitlines()) if f"alarm {alarm} raised" in line["event"]]
-    fields = said["detail"].model_dump(mode="json")
+    fields = texts["detail"].model_dump(mode="json")
     assert (fields["id"], fields["parameters"]) in [(line["message"], line["parameters"]) for line in raised]
-    assert str(said["detail"]) in [line["event"].partition(": ")[2] for line in raised]
-    return said["detail"]
+    assert str(texts["detail"]) in [line["event"].partition(": ")[2] for line in raised]
+    return texts["detail"]
 
 
-async def remembered(outcome: Outcome, said: Message, pages: Pages, file: Path) -> None:
-    """Check that an inspection's record says what ended it, in the API, on its page and at the command line."""
+async def remembered(outcome: Outcome, message: Message, pages: Pages, file: Path) -> None:
+    """Check that an inspection's record has what ended it, in the API, on its page and at the command line."""
     data = json.loads(await pages.get(f"/api/v1/inspections/{outcome.sequence}"))
     explanation = [read(each) for each in data["messages"]]
-    assert said.id in {each.id for each in explanation}
+    assert message.id in {each.id for each in explanation}
     page = await pages.text(f"/history/{outcome.sequence}")
     assert [each for each in explanation if german(each) not in page] == []
 
@@ -155,8 +155,8 @@ async def fail(cell: Any, device: str, fault: str) -> Outcome:
     """Switch a device's fault on in the middle of an inspection, and return its outcome."""
     await cell.line.ready()
     cell.at(State.SETTLING, lambda: cell.twin.boards[device].set(fault))
-    begun = await cell.line.begin()
-    return await cell.line.outcome(begun.sequence)
+    reply = await cell.line.begin()
+    return await cell.line.outcome(reply.sequence)
 
 
 @pytest.mark.timeout(240)

@@ -1,4 +1,4 @@
-"""The station as a process of its own on a whole simulated cell: killed, told to end, stopped by arm or person."""
+"""The station as a process of its own on a whole simulated cell: killed, ended, stopped by arm or person."""
 
 import asyncio
 import contextlib
@@ -78,11 +78,11 @@ def cell(settings_file, line_client):
 
 
 async def aborted(line):
-    """A stop is latched: at once, or with the next check of an arm that first said only that its move had failed."""
+    """A stop is latched: at once, or with the next check of an arm that reported only a failed move first."""
     deadline_s = time.monotonic() + 30
     while True:
         state = await line.state()
-        assert not state.ready, "whatever the arm has said so far"
+        assert not state.ready, "with any report of the arm so far"
         if (state.packml_state, state.error_code) == (PackmlState.ABORTED, 2):
             return
         assert time.monotonic() < deadline_s, state
@@ -97,13 +97,13 @@ def test_a_killed_a_stopped_and_an_ended_station_lose_and_double_nothing(cell):
         async with cell.line() as line:
             assert (await line.order(CommandName.CHANGE_RECIPE, 2)).done
             await line.ready()
-            begun = await line.begin()
+            reply = await line.begin()
             assert (await line.state()).packml_state in {PackmlState.STARTING, PackmlState.EXECUTE}
             first.kill()
             first.wait()
-            return begun
+            return reply
 
-    begun = asyncio.run(until_killed())
+    reply = asyncio.run(until_killed())
     second = cell.service()
 
     async def until_ended():
@@ -113,13 +113,13 @@ def test_a_killed_a_stopped_and_an_ended_station_lose_and_double_nothing(cell):
             held = await line.open()
             assert held.running is None
             [lost] = held.outcomes
-            assert (lost.sequence, lost.outcome, lost.reasons) == (begun.sequence, "NO_RESULT", (Reason.STATION_LOST,))
-            assert await line.outcome(begun.sequence) == lost
+            assert (lost.sequence, lost.outcome, lost.reasons) == (reply.sequence, "NO_RESULT", (Reason.STATION_LOST,))
+            assert await line.outcome(reply.sequence) == lost
             await line.publish(lost)
             assert (await line.open()).outcomes == ()
 
             stopped = await line.begin()
-            assert stopped.sequence == begun.sequence + 1
+            assert stopped.sequence == reply.sequence + 1
             for do in ("set", "clear"):
                 cell.twin_is(do=do, device="arm", fault="protective_stop", amount=1.0)
             outcome = await line.outcome(stopped.sequence)
@@ -174,15 +174,15 @@ def order(name, argument=""):
 
 @pytest.mark.timeout(400)
 def test_what_only_a_person_may_end_outlives_kills_and_nothing_moves_meanwhile(cell):
-    """A fruit that the arm carries, a safety stop confirmed while nobody watches, stops on pendant and panel."""
+    """A fruit that the arm carries, a safety stop confirmed while the station is away, stops on pendant and panel."""
 
     async def kill_while_carrying(service):
         async with cell.line() as line:
             assert (await line.order(CommandName.CHANGE_RECIPE, 2)).done
             await line.ready()
-            begun = await line.begin()
+            reply = await line.begin()
             cell.twin_is(do="set", device="arm", fault="slow", amount=4.0)
-            outcome = await line.outcome(begun.sequence)
+            outcome = await line.outcome(reply.sequence)
             service.kill()
             service.wait()
             cell.twin_is(do="clear", device="arm", fault="slow")
@@ -244,8 +244,8 @@ def test_what_only_a_person_may_end_outlives_kills_and_nothing_moves_meanwhile(c
     asyncio.run(is_held(PackmlState.ABORTED, states.LATCHED()))
     asyncio.run(reset())
 
-    asked = asyncio.run(at_the_panel(cell.file, order(OperatorCommandName.STOP), OperatorCommandView))
-    asyncio.run(is_done(cell.file, asked.ticket))
+    view = asyncio.run(at_the_panel(cell.file, order(OperatorCommandName.STOP), OperatorCommandView))
+    asyncio.run(is_done(cell.file, view.ticket))
     service.kill()
     service.wait()
     service = cell.service()

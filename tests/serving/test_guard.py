@@ -1,4 +1,4 @@
-"""The guard of our HTTP servers, asked over sockets, with short time limits."""
+"""The guard of our HTTP servers, tested over sockets, with short time limits."""
 
 import asyncio
 import contextlib
@@ -15,7 +15,7 @@ from station.serving.guard import Limits, is_this_machines
 from station.serving.server import Server, listen
 from tests.eventually import until
 
-ASK = b"GET / HTTP/1.1\r\nhost: here\r\n\r\n"
+REQUEST = b"GET / HTTP/1.1\r\nhost: here\r\n\r\n"
 LARGE = b"GET /large HTTP/1.1\r\nhost: here\r\n\r\n"
 ENDLESS = b"GET /endless HTTP/1.1\r\nhost: here\r\n\r\n"
 LONG = b"GET /long HTTP/1.1\r\nhost: here\r\n\r\n"
@@ -48,7 +48,7 @@ class Door:
         with contextlib.suppress(OSError):
             await writer.wait_closed()
 
-    async def ask(self, source=STRANGER, request=ASK):
+    async def is_served(self, source=STRANGER, request=REQUEST):
         """Return whether a new connection's request is answered."""
         reader, writer = await self.come(source)
         writer.write(request)
@@ -91,7 +91,7 @@ def door():
                 async def pieces():
                     while True:
                         yield bytes(1_000_000)
-                        await asyncio.sleep(0)  # what has nobody to send to does not wait
+                        await asyncio.sleep(0)  # what has no client to send to does not wait
 
                 return StreamingResponse(pieces())
 
@@ -119,15 +119,15 @@ def door():
 def test_silent_connections_make_room_and_end(door):
     async def steps(door):
         silent = [(await door.come())[0] for _ in range(60)]
-        assert await door.ask(), "from the same address"
-        assert await door.ask(ANOTHER)
+        assert await door.is_served(), "from the same address"
+        assert await door.is_served(ANOTHER)
         assert door.listener.flooded_by == STRANGER
         assert all([await ended(reader) for reader in silent])
 
     door(steps)
 
 
-@pytest.mark.parametrize("sent", [b"", ASK[:-1], ASK], ids=["silent", "half a header", "whole requests"])
+@pytest.mark.parametrize("sent", [b"", REQUEST[:-1], REQUEST], ids=["silent", "half a header", "whole requests"])
 def test_a_request_among_a_crowd_of_its_own_address_is_answered(door, sent):
     async def steps(door):
         with contextlib.ExitStack() as stack:
@@ -141,7 +141,7 @@ def test_a_request_among_a_crowd_of_its_own_address_is_answered(door, sent):
                 return clients
 
             come(30, sent)
-            (person,) = come(1, ASK)
+            (person,) = come(1, REQUEST)
             come(90, sent)
             person.setblocking(False)
             async with asyncio.timeout(LIMIT_S):
@@ -155,10 +155,10 @@ def test_who_speaks_is_not_displaced_by_silent_clients(door, monkeypatch):
 
     async def steps(door):
         reader, writer = await door.come()
-        writer.write(ASK[:-2])  # as a TLS handshake that is not finished yet
+        writer.write(REQUEST[:-2])  # as a TLS handshake that is not finished yet
         for _ in range(12):
             await door.come()
-        writer.write(ASK[-2:])
+        writer.write(REQUEST[-2:])
         assert await answered(reader)
 
     door(steps)
@@ -167,7 +167,7 @@ def test_who_speaks_is_not_displaced_by_silent_clients(door, monkeypatch):
 def test_half_a_header_ends_in_time_and_a_drip_does_not_prolong_it(door):
     async def steps(door):
         reader, writer = await door.come()
-        for letter in ASK[:-1].decode() * 3:
+        for letter in REQUEST[:-1].decode() * 3:
             with contextlib.suppress(OSError):
                 writer.write(letter.encode())
                 await asyncio.sleep(0.1)
@@ -181,13 +181,13 @@ def test_half_a_header_ends_in_time_and_a_drip_does_not_prolong_it(door):
 def test_after_an_answer_the_next_request_has_its_time_again(door):
     async def steps(door):
         reader, writer = await door.come()
-        writer.write(ASK)
+        writer.write(REQUEST)
         assert await answered(reader)
         await asyncio.sleep(1.3)  # more than the first request's time
-        writer.write(ASK)
+        writer.write(REQUEST)
         async with asyncio.timeout(LIMIT_S):
             assert b"HTTP/1.1 200" in await reader.readuntil(b"here") + await reader.readuntil(b"here")
-        writer.write(ASK[:10])
+        writer.write(REQUEST[:10])
         async with asyncio.timeout(LIMIT_S):
             await reader.read()
 
@@ -202,7 +202,7 @@ def test_a_client_that_does_not_take_its_response_ends(door, request_):
             deaf.sendall(request_)
             await until(lambda: files() == before + 2, LIMIT_S)
             await until(lambda: files() == before + 1, LIMIT_S)
-        assert await door.ask()
+        assert await door.is_served()
 
     door(steps)
 
@@ -213,8 +213,8 @@ def test_requests_under_way_do_not_give_way_and_leave_the_reserve_alone(door):
             for _ in range(4):
                 (await door.come(source))[1].write(LONG)
         await until(lambda: len(door.under_way) == 8, LIMIT_S)
-        assert not await door.ask("127.0.0.7")
-        assert await door.ask(KNOWN)
+        assert not await door.is_served("127.0.0.7")
+        assert await door.is_served(KNOWN)
 
     door(steps)
 
@@ -227,8 +227,8 @@ def test_a_place_is_held_until_the_request_of_who_left_is_done(door):
             before = len(door.under_way)
             await until(lambda before=before: len(door.under_way) > before, LIMIT_S)
             await door.leave(writer)
-        assert not await door.ask()
-        assert await door.ask(ANOTHER)
+        assert not await door.is_served()
+        assert await door.is_served(ANOTHER)
 
     door(steps)
 

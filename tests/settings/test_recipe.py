@@ -1,4 +1,4 @@
-"""Recipes: what is wrong is said with file, line, field and what was expected; the shipped ones are good."""
+"""Recipes: a mistake is reported with file, line, field and what was expected; the shipped ones are good."""
 
 import json
 import math
@@ -40,7 +40,7 @@ NO_ROOM = (
     "(lower it, raise area_mm2, or lower damage.uncertainty), got {got}"
 )
 
-# What is changed in the small recipe, by regular expression, and what has to be said then.
+# What is changed in the small recipe, by regular expression, and the message that has to follow.
 BAD = {
     "text for a number": (
         r"step_mm: 1",
@@ -652,7 +652,7 @@ def test_a_light_touch_and_a_count_are_as_the_judge_and_the_gripper_have_them():
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_by_every_recipe_that_is_accepted_a_fruit_can_pass(small, data):
-    """A straight curve under the limits, each step up to half a count of the gripper further than asked for."""
+    """A straight curve under the limits, each step up to half a count of the gripper further than commanded."""
     tenths = st.integers(1, 40)
     step_mm, closings = data.draw(st.integers(4, 20)) / 10, sorted(data.draw(st.sets(tenths, min_size=1, max_size=3)))
     values = parse_document(small.encode(), "f").value

@@ -1,4 +1,4 @@
-"""A Dask cluster of two processes: tells its address on standard output, and ends when standard input does."""
+"""A Dask cluster of two processes: prints its address on standard output, and ends when standard input does."""
 
 import sys
 
@@ -6,7 +6,7 @@ from distributed import LocalCluster
 
 
 def main() -> None:
-    """Serve until told to end."""
+    """Serve until standard input ends."""
     with LocalCluster(
         n_workers=2,
         threads_per_worker=1,

@@ -203,7 +203,7 @@ def test_a_file_is_read_as_it_was_written(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("", ":1: expected the columns"),
         ("part,operator,area_mm2\n", "repeat is missing"),
@@ -219,12 +219,12 @@ def test_a_file_is_read_as_it_was_written(tmp_path: Path):
         (f'{HEADER}\n"1,A\n', "is not a CSV file"),
     ],
 )
-def test_a_bad_file_is_refused_by_its_line(tmp_path: Path, text: str, told: str):
+def test_a_bad_file_is_refused_by_its_line(tmp_path: Path, text: str, message: str):
     path = tmp_path / "m.csv"
     path.write_text(text)
     with pytest.raises(BadInputError, match=r"m\.csv") as refusal:
         crossed(read_measurements(path), str(path))
-    assert told in str(refusal.value)
+    assert message in str(refusal.value)
 
 
 def test_bytes_that_are_no_text_are_refused(tmp_path: Path):

@@ -34,8 +34,8 @@ from station.vision.contact import Contact
 from station.vocabulary import Flag
 
 
-def asked(*arguments: object) -> Result:
-    """The command in this process, without its signal's handler."""
+def run_command(*arguments: object) -> Result:
+    """Run the command in this process, without its signal's handler."""
     before = signal.getsignal(signal.SIGTERM)
     try:
         return CliRunner().invoke(grr, [str(one) for one in arguments])
@@ -59,7 +59,7 @@ def measurements(tmp_path: Path) -> Path:
 
 def test_measurements_of_a_file_are_analysed(measurements: Path, tmp_path: Path):
     out = tmp_path / "new" / "out"
-    found = asked(measurements, "--tolerance", 50, "--out", out)
+    found = run_command(measurements, "--tolerance", 50, "--out", out)
     assert found.exit_code == 0, found.output
     assert "of the tolerance: acceptable" in found.output
     summary = json.loads((out / "grr.json").read_text())
@@ -84,7 +84,7 @@ def test_identical_repeats_are_perfectly_repeatable_and_an_infinite_f_is_no_numb
             rows += [f"{part},{operator},{repeat},{area}" for repeat in (1, 2, 3)]
     path = tmp_path / "measurements.csv"
     path.write_text("\n".join(rows) + "\n")
-    found = asked(path, "--tolerance", 50, "--out", tmp_path / "out")
+    found = run_command(path, "--tolerance", 50, "--out", tmp_path / "out")
     assert found.exit_code == 0, found.output
     text = (tmp_path / "out" / "grr.json").read_text()
     summary = json.loads(text)
@@ -98,20 +98,20 @@ def test_identical_repeats_are_perfectly_repeatable_and_an_infinite_f_is_no_numb
 
 
 def test_without_a_tolerance_the_total_variation_judges(measurements: Path, tmp_path: Path):
-    found = asked(measurements, "--out", tmp_path / "out")
+    found = run_command(measurements, "--out", tmp_path / "out")
     assert found.exit_code == 0, found.output
     assert "of the total variation" in found.output
     assert "of the tolerance" not in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_what_cannot_be_done_is_told(measurements: Path, tmp_path: Path):
-    assert "either a CSV file of measurements or --twin" in asked("--out", tmp_path / "a").output
-    assert "either a CSV file" in asked(measurements, "--twin", "--out", tmp_path / "a").output
-    assert "--dummies goes with --twin" in asked(measurements, "--dummies", "--out", tmp_path / "a").output
-    assert "not in the range" in asked("--twin", "--parts", 1, "--out", tmp_path / "a").output
-    assert "not in the range" in asked(measurements, "--tolerance", 0, "--out", tmp_path / "a").output
+    assert "either a CSV file of measurements or --twin" in run_command("--out", tmp_path / "a").output
+    assert "either a CSV file" in run_command(measurements, "--twin", "--out", tmp_path / "a").output
+    assert "--dummies goes with --twin" in run_command(measurements, "--dummies", "--out", tmp_path / "a").output
+    assert "not in the range" in run_command("--twin", "--parts", 1, "--out", tmp_path / "a").output
+    assert "not in the range" in run_command(measurements, "--tolerance", 0, "--out", tmp_path / "a").output
     for name, out in (("nothing.csv", tmp_path / "a"), (measurements.name, tmp_path)):
-        found = asked(tmp_path / name, "--out", out)
+        found = run_command(tmp_path / name, "--out", out)
         assert isinstance(found.exception, BadInputError)
     assert sorted(path.name for path in tmp_path.iterdir()) == [measurements.name]
 
@@ -121,7 +121,7 @@ def test_a_full_disk_leaves_nothing(measurements: Path, tmp_path: Path, monkeypa
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    found = asked(measurements, "--out", tmp_path / "out")
+    found = run_command(measurements, "--out", tmp_path / "out")
     assert isinstance(found.exception, StationError)
     assert "nothing is stored: free space" in str(found.exception)
     assert [path.name for path in tmp_path.iterdir()] == [measurements.name]
@@ -137,7 +137,7 @@ def test_interrupted_in_the_middle_it_leaves_nothing(tmp_path: Path, monkeypatch
         return measure_part(task)
 
     monkeypatch.setattr(gauge_design, "measure_part", interrupted)
-    found = asked("--twin", "--fruit", "blueberry", "--parts", 2, "--jobs", 1, "--out", tmp_path / "out")
+    found = run_command("--twin", "--fruit", "blueberry", "--parts", 2, "--jobs", 1, "--out", tmp_path / "out")
     assert found.exit_code != 0
     assert "Aborted" in found.output
     assert gripped
@@ -171,9 +171,11 @@ def test_what_varies_is_told_row_by_row(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_the_gauge_alone_repeats(tmp_path: Path):
-    """The smallest and the largest ball: both are told apart far beyond the gauge's own variation."""
+    """The smallest and the largest ball: they differ far beyond the gauge's own variation."""
     out = tmp_path / "out"
-    found = asked("--twin", "--dummies", "--parts", 2, "--operators", 2, "--repeats", 2, "--jobs", 1, "--out", out)
+    found = run_command(
+        "--twin", "--dummies", "--parts", 2, "--operators", 2, "--repeats", 2, "--jobs", 1, "--out", out
+    )
     assert found.exit_code == 0, found.output
     summary = json.loads((out / "grr.json").read_text())
     assert summary["agreement"] is None

@@ -44,13 +44,13 @@ def pressed(areas_mm2=SOUND_MM2, offset_px=(0.0, 0.0), flags=(), confidence=0.9)
 
 
 class Presses:
-    """Closings handed out in turn, and which were asked for."""
+    """Closings returned in turn, and which were requested."""
 
     def __init__(self, *answers: Pressed | None) -> None:
-        self.answers, self.asked = list(answers), []
+        self.answers, self.requested = list(answers), []
 
     def __call__(self, closing: Closing) -> Pressed | None:
-        self.asked.append(closing)
+        self.requested.append(closing)
         return self.answers.pop(0)
 
 
@@ -135,14 +135,14 @@ class TestDeciding:
         presses = Presses(pressed())
         one = inspect(BLUEBERRY, recipe, Practice(), presses)
         assert (one.outcome, one.closings) == ("PASS", 1)
-        assert presses.asked == [Closing(BLUEBERRY, 0, (0.0, 0.0))]
+        assert presses.requested == [Closing(BLUEBERRY, 0, (0.0, 0.0))]
         assert one.most_force_n == (one.steps) / 2
 
     def test_a_contact_off_the_middle_is_centred_before_it_is_judged(self, recipe):
         presses = Presses(pressed((9.0,) * 5, offset_px=(40.0, 0.0)), pressed())
         one = inspect(BLUEBERRY, recipe, Practice(), presses)
         assert (one.outcome, one.closings) == ("PASS", 2)
-        assert presses.asked[1] == Closing(BLUEBERRY, 1, (-1.05, 0.0))
+        assert presses.requested[1] == Closing(BLUEBERRY, 1, (-1.05, 0.0))
         assert (
             inspect(BLUEBERRY, recipe, Practice(centring=False), Presses(pressed(offset_px=(40.0, 0.0)))).closings == 1
         )
@@ -183,13 +183,13 @@ class TestDeciding:
         assert missing.value.closing == Closing(BLUEBERRY, 1, (-1.05, 0.0))
 
     @pytest.mark.parametrize(
-        ("size", "told"), [("length", (True, False)), ("class", (False, True)), ("none", (False,) * 2)]
+        ("size", "given"), [("length", (True, False)), ("class", (False, True)), ("none", (False,) * 2)]
     )
-    def test_the_judge_gets_the_size_that_the_grader_gives(self, recipe, size, told):
+    def test_the_judge_gets_the_size_that_the_grader_gives(self, recipe, size, given):
         practice = Practice(size=size)
         by = sized_by(practice, recipe)
         press, _ = as_stopped(pressed(), draw(BLUEBERRY), by, practice, ())
-        assert (press.size.length_mm is not None, press.size.size_class is not None) == told
+        assert (press.size.length_mm is not None, press.size.size_class is not None) == given
         assert by.damage.size is not None
         assert by.damage.size.judged_by == ("class" if size == "class" else "length")
 

@@ -28,8 +28,8 @@ TASK = Task("blueberry", "robust", 5, 1)
 pytestmark = pytest.mark.timeout(600)
 
 
-def asked(*arguments: object) -> Result:
-    """The command in this process, without its signal's handler."""
+def run_command(*arguments: object) -> Result:
+    """Run the command in this process, without its signal's handler."""
     before = signal.getsignal(signal.SIGTERM)
     try:
         return CliRunner().invoke(study, [str(one) for one in (*ARGUMENTS, *arguments)])
@@ -119,10 +119,10 @@ def test_an_interrupted_study_keeps_what_it_measured(tmp_path: Path):
         assert time.monotonic() < deadline
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGINT)
-    _, told = process.communicate(timeout=DEADLINE_S)
+    _, output = process.communicate(timeout=DEADLINE_S)
     assert process.returncode == 130
-    assert "the same command goes on from there" in told
-    assert "Traceback" not in told
+    assert "the same command goes on from there" in output
+    assert "Traceback" not in output
     stored = list((out / "samples").iterdir())
     assert stored
     assert all(json.loads(path.read_bytes())["areas_px"] for path in stored)
@@ -130,7 +130,7 @@ def test_an_interrupted_study_keeps_what_it_measured(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (("--fruit", "kiwi"), "'kiwi' is not one of"),
         (("--samples", 0), "0 is not in the range"),
@@ -141,15 +141,15 @@ def test_an_interrupted_study_keeps_what_it_measured(tmp_path: Path):
         (("--jobs", 0), "is not in the range"),
     ],
 )
-def test_bad_usage_is_told(tmp_path: Path, arguments: tuple[object, ...], told: str):
-    found = asked("--samples", 1, "--out", tmp_path / "out", *arguments)
+def test_bad_usage_is_told(tmp_path: Path, arguments: tuple[object, ...], message: str):
+    found = run_command("--samples", 1, "--out", tmp_path / "out", *arguments)
     assert found.exit_code == 2
-    assert told in found.output
+    assert message in found.output
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
-    ("label", "told"),
+    ("label", "message"),
     [
         (
             {"fruit": "strawberry", "method": "paper"},
@@ -160,12 +160,12 @@ def test_bad_usage_is_told(tmp_path: Path, arguments: tuple[object, ...], told: 
         ({"seed": "five"}, "is not a study's"),
     ],
 )
-def test_another_study_s_folder_is_refused(tmp_path: Path, label: dict[str, object], told: str):
+def test_another_study_s_folder_is_refused(tmp_path: Path, label: dict[str, object], message: str):
     whole = {"fruit": "blueberry", "method": "robust", "seed": 5, "measured_by": "0", **label}
     (tmp_path / "study.json").write_text(json.dumps(whole))
     with pytest.raises(BadInputError, match="name a new folder") as refusal:
         run_study(request(tmp_path, 1), lambda _: None, lambda: None)
-    assert told in str(refusal.value)
+    assert message in str(refusal.value)
     assert [path.name for path in tmp_path.iterdir()] == ["study.json"]
 
 
@@ -173,15 +173,15 @@ def test_a_folder_that_cannot_be_used_is_refused(tmp_path: Path):
     file = tmp_path / "file"
     file.touch()
     for out in (file, file / "below", Path("/proc/study")):
-        found = asked("--samples", 1, "--out", out)
+        found = run_command("--samples", 1, "--out", out)
         assert isinstance(found.exception, BadInputError)
         assert "name another folder" in str(found.exception)
-    found = asked("--samples", 1, "--out", tmp_path)
+    found = run_command("--samples", 1, "--out", tmp_path)
     assert "holds no study" in str(found.exception)
 
 
 def test_a_disk_that_is_full_leaves_nothing_half_written(tmp_path: Path):
-    """A limit on the size of files stands for the disk: a sample takes more than 512 bytes, the label less."""
+    """A limit on the size of files simulates the full disk: a sample takes more than 512 bytes, the label less."""
     out = tmp_path / "out"
     command = [sys.executable, "-B", "-m", "station", "study", *ARGUMENTS, "--samples", "1", "--out", str(out)]
 
@@ -206,6 +206,6 @@ def test_a_disk_that_is_full_leaves_nothing_half_written(tmp_path: Path):
 
 def test_a_cluster_that_is_not_there_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    found = asked("--samples", 1, "--out", tmp_path / "a", "--scheduler", "tcp://127.0.0.1:1")
+    found = run_command("--samples", 1, "--out", tmp_path / "a", "--scheduler", "tcp://127.0.0.1:1")
     assert isinstance(found.exception, BadInputError)
     assert "pip install 'fruit-station[cluster]'" in str(found.exception)

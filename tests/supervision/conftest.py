@@ -1,4 +1,4 @@
-"""Small programs to supervise, each told by a word what to do wrong."""
+"""Small programs to supervise, each with a word for what it does wrong."""
 
 import asyncio
 import functools

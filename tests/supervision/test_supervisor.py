@@ -71,7 +71,7 @@ def test_what_dies_is_started_again_and_the_others_go_on(bench, until, number, m
         os.kill(bench.pids("second")[0], number)
         await until(lambda: len(bench.pids("second")) == 2)
         monkeypatch.setenv(RESTARTS_VARIABLE, environment(bench.pids("first")[0])[RESTARTS_VARIABLE])
-        assert [(name, told.total, told.within(60)) for name, told in restarts.read().items()] == [
+        assert [(name, counts.total, counts.within(60)) for name, counts in restarts.read().items()] == [
             ("first", 0, 0), ("second", 1, 1)
         ]  # fmt: skip
         await until(lambda: supervisor.ready("second"))
@@ -107,7 +107,7 @@ def test_what_dies_again_and_again_is_given_up_and_the_rest_goes_on(bench, until
             os.kill(bench.pids("second")[-1], signal.SIGKILL)
         await until(lambda: "is not started again" in bench.caplog.text)
         monkeypatch.setenv(RESTARTS_VARIABLE, environment(bench.pids("first")[0])[RESTARTS_VARIABLE])
-        assert {name: told.given_up for name, told in restarts.read().items()} == {"first": False, "second": True}
+        assert {name: counts.given_up for name, counts in restarts.read().items()} == {"first": False, "second": True}
         assert psutil.pid_exists(bench.pids("first")[0])
         ended.set()
 
@@ -125,7 +125,7 @@ def test_what_does_not_become_ready_ends_everything_with_its_name(bench, how, li
     with pytest.raises(SupervisionError, match=f"the process second {words}"):
         bench.run([bench.program("first"), bench.program("second", how, start_limit_s=limit_s)], end)
     assert not bench.ready
-    # Not by what it writes: on a busy machine Python itself has not begun after 2 s.
+    # Not by what it writes: on a busy machine Python itself has not started after 2 s.
     assert not psutil.Process().children()
 
 

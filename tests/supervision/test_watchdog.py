@@ -1,4 +1,4 @@
-"""The supervisor below systemd: ready, in progress, stopping, told over a real notification socket."""
+"""The supervisor below systemd: ready, in progress, stopping, reported over a real notification socket."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""A device of the twin that is gone answers nobody, also not a client whom it was just letting in."""
+"""A device of the twin that is gone answers no client, also not one that it was just accepting."""
 
 import asyncio
 import contextlib

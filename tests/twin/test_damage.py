@@ -39,7 +39,7 @@ def test_a_bruise_is_the_severe_one_unless_told_otherwise():
 def test_a_load_lies_over_the_patch_under_it_and_not_beside_it():
     radii = np.array([0.0, 2.0, 4.0, 8.0])
     middle = SoftPatch(4.0, 0.5).load_share(radii)
-    # Johnson, Contact Mechanics, 4.22: of Hertz's load 1 - (1 - r²/a²)^(3/2) lies within r.
+    # Johnson, Contact Mechanics, 4.22: of Hertz's load 1 - (1 - r²/a²)^(3/2) is within r.
     assert middle == pytest.approx([1.0, 1.0, 1.0, 1.0 - 0.75**1.5], abs=0.02)
     assert SoftPatch(4.0, 0.5, x_mm=13.0).load_share(radii) == pytest.approx([0.0, 0.0, 0.0, 0.0])
     aside = SoftPatch(4.0, 0.5, y_mm=4.0).load_share(radii[1:])

@@ -48,7 +48,7 @@ def test_a_hard_spheres_contact_is_hertzs(closing_mm):
     assert step.dent_mm == pytest.approx(step.approach_mm, rel=0.01)
     assert step.force_n == pytest.approx(hertz_n * gel.stiffening(step.approach_mm, 3.0), rel=0.01)
     footprint = FruitOnGel(sphere, Pose(), gel).pressed(step)
-    # The visible edge lies 3.5 px (0.093 mm) outside Hertz's, and up to 0.1 mm more where the dent is steep.
+    # The visible edge is 3.5 px (0.093 mm) outside Hertz's, and up to 0.1 mm more where the dent is steep.
     assert radius_mm + 0.08 < np.sqrt(footprint.true_area_mm2 / np.pi) < radius_mm + 0.25
 
 

@@ -55,7 +55,7 @@ def test_the_document_has_every_other_number():
     assert missing == [], "renew the page: ./run bench fit --evaluate"
 
 
-SEEDS_TOLD = """
+PRINT_SEEDS = """
 from fit.parts import SEEDS
 from fit.reference import TWIN_PAIRS
 from fit.reliability import FIRST_SEEDS
@@ -70,10 +70,10 @@ print(soft_table.SEEDS.start, references.TWIN_SEEDS.start, untouched.UNITS.start
 def test_what_the_measurement_is_judged_on_shares_no_seed_with_the_fit():
     """A set takes the seeds after its first one: by the thousand, which none exceeds."""
     paths = os.pathsep.join([str(ROOT), str(ROOT / "benchmarks")])
-    told = subprocess.run(
-        [sys.executable, "-c", SEEDS_TOLD], env={**os.environ, "PYTHONPATH": paths}, check=True, capture_output=True
+    done = subprocess.run(
+        [sys.executable, "-c", PRINT_SEEDS], env={**os.environ, "PYTHONPATH": paths}, check=True, capture_output=True
     )
-    fitted, *judged = ({int(seed) // 1000 for seed in line.split()} for line in told.stdout.splitlines())
+    fitted, *judged = ({int(seed) // 1000 for seed in line.split()} for line in done.stdout.splitlines())
     assert len(fitted) == 17
     assert len(set().union(*judged)) == 10
     assert fitted.isdisjoint(set().union(*judged))

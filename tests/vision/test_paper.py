@@ -112,9 +112,9 @@ def test_closing_comes_before_opening():
 @given(scale=st.sampled_from([0.25, 0.5, 1.0, 1.5]))
 def test_the_smallest_component_scales_with_the_image(scale):
     shape = round(640 * scale), round(480 * scale)
-    kept, dropped = (disc(shape, (shape[1] // 2, shape[0] // 2), round(radius * scale)) for radius in (44, 36))
-    assert clean(kept, PARAMETERS).any()
-    assert not clean(dropped, PARAMETERS).any()
+    large, small = (disc(shape, (shape[1] // 2, shape[0] // 2), round(radius * scale)) for radius in (44, 36))
+    assert clean(large, PARAMETERS).any()
+    assert not clean(small, PARAMETERS).any()
 
 
 def test_the_same_image_gives_the_same_mask_each_time():
@@ -146,7 +146,7 @@ def test_a_bright_press_is_found_in_any_size_and_orientation(shape):
 
 
 def test_equal_images_give_the_whole_image_as_the_printed_pipeline_does():
-    """The pipeline has no contact gate. This is its known fault, kept on purpose under the name `paper`."""
+    """The pipeline has no contact gate. This is its known fault, left in on purpose under the name `paper`."""
     reference = np.full((64, 48, 3), 100, np.uint8)
     assert PaperMethod(reference, PARAMETERS).measure(reference).area_px == reference.shape[0] * reference.shape[1]
 

@@ -143,7 +143,7 @@ def draft(tmp_path: Path, orchard: Orchard) -> Callable[..., Path]:
 
 @pytest.fixture
 def station(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str]]:
-    """Call the command line: its exit code, and what it said."""
+    """Run the command line; return its exit code and its output."""
     monkeypatch.setenv("STATION_RECIPES_FOLDER", str(RECIPES))
     monkeypatch.setenv("STATION_HOME", str(tmp_path / "home"))
     return call

@@ -93,18 +93,18 @@ def test_the_errors_on_fruit_left_out_are_those_on_other_fruit_also_where_the_cl
         }
         return fruit, good
 
-    told, compared, on_others = [], [], []
+    left_out_costs, compared, on_others = [], [], []
     for seed in range(16):
         random = np.random.default_rng(seed)
         best = proposals_of(*drawn(random, 24), rule, COSTS)[0]
         assert best.left_out is not None
         diverted, of_good, passed, of_bad = best.left_out
-        told.append(COSTS.of(passed / of_bad, diverted / of_good))
+        left_out_costs.append(COSTS.of(passed / of_bad, diverted / of_good))
         compared.append(best.cost(COSTS))
         others = at_reference(drawn(random, 3000)[0][best.closing_mm], best.exponent, rule.reference_mm)
         on_others.append(cost(*others, best.limit_mm2))
-    standard_error = np.std(told) / math.sqrt(len(told))
-    assert np.mean(told) > np.mean(on_others) - standard_error
+    standard_error = np.std(left_out_costs) / math.sqrt(len(left_out_costs))
+    assert np.mean(left_out_costs) > np.mean(on_others) - standard_error
     assert np.mean(compared) < np.mean(on_others) - 2 * standard_error, "by the closing's own limits it is less"
 
 
@@ -198,7 +198,7 @@ class TestWhatAPressSays:
         assert found[0] != marked_fruit(self.press(), self.RECIPE, 3.0, good=True, draft=loose)
 
     def test_a_limit_that_no_recipe_may_have_is_none(self):
-        """Of a small fruit's large area: for a fruit of the reference length it is beyond what a recipe may say."""
+        """Of a small fruit's large area: for a fruit of the reference length it is beyond the range of a recipe."""
         press = replace(self.press((8.0, 60.0, 100.0, 150.0)), onset_mm=22.0, size=FruitSize(length_mm=21.0))
         one = marked_fruit(press, self.RECIPE, 3.0, good=True, draft=self.RECIPE)
         assert one is not None
@@ -218,7 +218,7 @@ class TestWhatAPressSays:
         assert (bad.passes_from_mm2, bad.at_least) == (160.0, True)
         fails = marked_fruit(stopped, self.RECIPE, 3.0, good=False, draft=self.RECIPE)
         assert fails is not None
-        assert (fails.passes_from_mm2, fails.at_least) == (math.inf, False), "by the limit at 1.9 mm, which is kept"
+        assert (fails.passes_from_mm2, fails.at_least) == (math.inf, False), "by the limit at 1.9 mm, not exceeded"
         good = marked_fruit(stopped, self.RECIPE, 3.0, good=True, draft=self.RECIPE)
         assert good is not None
         assert math.isinf(good.passes_from_mm2)
@@ -261,9 +261,9 @@ def test_a_limit_is_proposed_from_marked_fruit_and_written_as_a_draft(orchard, d
     marks.write_text("sequence,mark\n" + rows + "9999,good\n")
     out, file = tmp_path / "out", tmp_path / "proposed.yaml"
     arguments = ("thresholds", "--recipe", "strawberry", "--marks", marks, "--out", out, "--draft", file)
-    code, told = station(*arguments)
+    code, output = station(*arguments)
     assert code == 0
-    assert "368 to show that at most 1 % pass" in told
+    assert "368 to show that at most 1 % pass" in output
     figures = json.loads((out / "thresholds.json").read_text())
     best = figures["proposed"]
     assert best["closing_mm"] == 3
@@ -275,17 +275,17 @@ def test_a_limit_is_proposed_from_marked_fruit_and_written_as_a_draft(orchard, d
     proposed = load_recipe(file)
     assert proposed.damage.area[0].area_mm2 == pytest.approx(best["limit_mm2"], abs=0.05)
     assert proposed.early_stop.area_mm2 >= proposed.damage.area[0].area_mm2
-    assert "# the paper" in file.read_text(), "comments are kept"
+    assert "# the paper" in file.read_text(), "comments remain"
     rates = figures["by_the_proposed_recipe"]
     assert (rates["bad"]["rejected"], rates["good"]["rejected"]) == (5, 0)
     page = (out / "thresholds.html").read_text()
     assert page.count("data:image/png") == 2
-    told_by_slider = json.loads(page.split("const curve = ")[1].split(", slider = ")[0])
-    assert told_by_slider == best["curve"]
+    slider_curve = json.loads(page.split("const curve = ")[1].split(", slider = ")[0])
+    assert slider_curve == best["curve"]
     assert "http" not in page, "it needs no network"
     again = ("thresholds", "--recipe", "strawberry", "--out", tmp_path / "again")
-    code, told = station(*again)
-    assert (code, "no fruit is marked" in told) == (2, True)
+    code, output = station(*again)
+    assert (code, "no fruit is marked" in output) == (2, True)
     for word, some in (("good", made[:40]), ("bad", made[40:])):
         assert station("records", "mark", *some, word)[0] == 0
     assert station(*again)[0] == 0
@@ -306,9 +306,9 @@ def test_marked_fruit_of_a_revision_that_pressed_or_measured_otherwise_are_left_
     other = replace(orchard, recipe=changed(orchard.recipe, **changes))
 
     def figures(name: str) -> tuple[dict[str, object], str]:
-        code, told = station("thresholds", "--recipe", "strawberry", "--out", tmp_path / name)
-        assert code == 0, told
-        return json.loads((tmp_path / name / "thresholds.json").read_text()), told
+        code, output = station("thresholds", "--recipe", "strawberry", "--out", tmp_path / name)
+        assert code == 0, output
+        return json.loads((tmp_path / name / "thresholds.json").read_text()), output
 
     def store_and_mark(orchard, good: list[float], bad: list[float]) -> None:
         made = orchard.store([orchard.press(growth, seed=number) for number, growth in enumerate([*good, *bad])])
@@ -316,16 +316,16 @@ def test_marked_fruit_of_a_revision_that_pressed_or_measured_otherwise_are_left_
             assert station("records", "mark", *some, word)[0] == 0
 
     store_and_mark(other, [29 + number / 4 for number in range(12)], [44.0, 45.0, 46.0])
-    code, told = station("thresholds", "--recipe", "strawberry", "--out", tmp_path / "none")
-    assert (code, f"15 marked fruit are left out: {why}" in told) == (2, True), told
+    code, output = station("thresholds", "--recipe", "strawberry", "--out", tmp_path / "none")
+    assert (code, f"15 marked fruit are left out: {why}" in output) == (2, True), output
     store_and_mark(orchard, [25 + number / 4 for number in range(12)], [40.0, 41.0, 42.0])
-    both, told = figures("both")
-    assert f"15 marked fruit left out: {why}" in told
+    both, output = figures("both")
+    assert f"15 marked fruit left out: {why}" in output
     assert both.pop("of_other_revisions") == {why: 15}
     for sequence in range(1, 16):
         assert station("records", "mark", sequence, "none")[0] == 0
-    alone, told = figures("alone")
-    assert "left out:" not in told
+    alone, output = figures("alone")
+    assert "left out:" not in output
     assert alone.pop("of_other_revisions") == {}
     assert both == alone
 
@@ -353,15 +353,15 @@ def test_the_proposed_limit_decides_on_every_fruit(
     for word, some in (("good", made[:30]), ("bad", made[30:])):
         assert station("records", "mark", *some, word)[0] == 0
     file = tmp_path / "proposed.yaml"
-    code, told = station("thresholds", "--recipe", "strawberry", "--out", tmp_path / "out", "--draft", file)
-    assert (code, "mm² at 3 mm" in told) == (0, True), told
+    code, output = station("thresholds", "--recipe", "strawberry", "--out", tmp_path / "out", "--draft", file)
+    assert (code, "mm² at 3 mm" in output) == (0, True), output
     damage = load_recipe(file).damage
     assert (damage.decided_by, len(damage.area)) == (drafted, 2)
     assert damage.area[1].area_mm2 < 130
 
 
 def test_no_comment_of_the_draft_is_of_a_value_before(orchard, station, tmp_path, monkeypatch):
-    """A limit above the early stop, at another closing, with another exponent: each line says where it is from."""
+    """A limit above the early stop, at another closing, with another exponent: each line names its source."""
     shipped = find_recipe("raspberry")
     early, (area,) = shipped.early_stop, shipped.damage.area
     stop = early.model_copy(update={"area_mm2": 62.0})
@@ -387,8 +387,8 @@ def test_no_comment_of_the_draft_is_of_a_value_before(orchard, station, tmp_path
     for word, some in (("good", made[:20]), ("bad", made[20:])):
         assert station("records", "mark", *some, word)[0] == 0
     proposed = tmp_path / "proposed.yaml"
-    code, told = station("thresholds", "--recipe", "raspberry", "--out", tmp_path / "out", "--draft", proposed)
-    assert code == 0, told
+    code, output = station("thresholds", "--recipe", "raspberry", "--out", tmp_path / "out", "--draft", proposed)
+    assert code == 0, output
     before, after = (each.replace("  #", " #").splitlines() for each in (text, proposed.read_text()))
     marked = "`station thresholds`: 20 good and 8 bad fruit"
     changed = [new for old, new in zip(before, after, strict=True) if old != new]
@@ -419,9 +419,9 @@ def test_a_limit_at_another_closing_has_the_least_area_of_there(orchard, station
     for word, some in (("good", made[:20]), ("bad", made[20:])):
         assert station("records", "mark", *some, word)[0] == 0
     proposed = tmp_path / "proposed.yaml"
-    code, told = station("thresholds", "--recipe", "raspberry", "--out", tmp_path / "out", "--draft", proposed)
-    assert (code, "mm² at 1.5 mm" in told) == (0, True), told
-    assert "good fruit diverted by the proposed recipe: 0 of 20" in told
+    code, output = station("thresholds", "--recipe", "raspberry", "--out", tmp_path / "out", "--draft", proposed)
+    assert (code, "mm² at 1.5 mm" in output) == (0, True), output
+    assert "good fruit diverted by the proposed recipe: 0 of 20" in output
     (area,) = load_recipe(proposed).damage.area
     assert (area.closing_mm, area.least_area_mm2) == (1.5, 15.5)
     assert 23 < area.area_mm2 < 38
@@ -460,7 +460,7 @@ def test_a_draft_of_several_limits_has_the_proposed_one_in_its_order(changed, tm
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "message"),
     [
         ("a,b\n", ":1: expected the header sequence,mark"),
         ("sequence,mark\n1,fine\n", ":2: mark: expected good or bad, got 'fine'"),
@@ -471,10 +471,10 @@ def test_a_draft_of_several_limits_has_the_proposed_one_in_its_order(changed, tm
         ("\x00", "expected"),
     ],
 )
-def test_bad_marks_are_told(orchard, station, tmp_path, content, told):
+def test_bad_marks_are_told(orchard, station, tmp_path, content, message):
     orchard.store([orchard.press(27.0)])
     marks = tmp_path / "marks.csv"
     marks.write_text(content)
-    code, said = station("thresholds", "--recipe", "strawberry", "--marks", marks, "--out", tmp_path / "out")
+    code, output = station("thresholds", "--recipe", "strawberry", "--marks", marks, "--out", tmp_path / "out")
     assert code == 2
-    assert told in said
+    assert message in output

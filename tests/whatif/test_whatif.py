@@ -56,7 +56,7 @@ def test_the_own_recipe_gives_what_is_stored(orchard):
 def test_a_verdict_on_a_stored_curve_is_that_of_the_fruit_pressed_by_the_draft(
     orchard, changed, growth, limit, growth_limit, stop, seed
 ):
-    """Whatever is said to be decided is so: the same fruit pressed by the draft goes to the same side."""
+    """Each verdict that is reported as decided is right: the same fruit pressed by the draft has the same outcome."""
     own = orchard.recipe
     values = {"damage__area__0__area_mm2": limit, "damage__growth_mm2_per_mm": growth_limit}
     draft = changed(own, early_stop__area_mm2=stop, early_stop__growth_mm2_per_mm=max(55.0, growth_limit), **values)
@@ -77,7 +77,7 @@ def test_a_curve_that_was_stopped_early_does_not_tell_what_would_have_come(orcha
     assert replayed.after == "UNDECIDABLE"
     assert replayed.why == messages.CURVE_STOPPED(reached_mm=stored.press.points[-1].closing_mm)
     stricter = changed(further, damage__area__0__area_mm2=62.0, damage__area__0__least_area_mm2=20.0)
-    assert replay(stored, orchard.recipe, stricter).after == "FAIL", "what is proven stands, whatever would have come"
+    assert replay(stored, orchard.recipe, stricter).after == "FAIL", "what is proven remains, with any further steps"
     near = changed(further, damage__area__0__area_mm2=stored.press.points[3].area_mm2 + 1)
     replayed = replay(stored, orchard.recipe, near)
     assert (replayed.after, replayed.why and replayed.why.id) == ("NO_RESULT", AREA_NEAR.id), "it cannot pass"
@@ -104,16 +104,16 @@ def test_what_no_stored_curve_can_tell_is_not_guessed(orchard, changed, changes,
 
 
 @pytest.mark.parametrize(
-    ("said", "interrupted"),
+    ("message", "interrupted"),
     [
         (STEPS_ENDED(reached_mm=2.0, wanted_mm=4.0), False),
         (INTERNAL_FAULT(), True),
         (verbatim("The steps ended at 2.0 mm of closing, before 4 mm, and nothing says why."), True),
     ],
 )
-def test_steps_that_ended_for_no_known_reason_are_no_fault_of_the_program(orchard, said, interrupted):
+def test_steps_that_ended_for_no_known_reason_are_no_fault_of_the_program(orchard, message, interrupted):
     (sequence,) = orchard.store([orchard.press(SOUND)])
-    stored = said.parameters["text"] if said.id == VERBATIM.id else said.model_dump(mode="json")
+    stored = message.parameters["text"] if message.id == VERBATIM.id else message.model_dump(mode="json")
     with closing(sqlite3.connect(orchard.folder / FILE_NAME)) as database, database:
         database.execute(
             "UPDATE inspections SET reasons = ?, explanation = ?",
@@ -162,9 +162,9 @@ def test_the_command_shows_which_fruit_change_sides_and_goes_on_where_it_was(orc
     orchard.store([orchard.press(growth, seed=7) for growth in (SOUND, BRUISED, BETWEEN)], "A")
     orchard.store([orchard.press(SOUND)], "B")
     file, out = draft(damage__area__0__area_mm2=90.0), tmp_path / "out"
-    code, told = station("whatif", "--recipe", file, "--lots", "A", "--out", out, "--jobs", 1)
+    code, output = station("whatif", "--recipe", file, "--lots", "A", "--out", out, "--jobs", 1)
     assert code == 0
-    assert "3 inspections, 3 decided by the draft" in told
+    assert "3 inspections, 3 decided by the draft" in output
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["rejects_before"], summary["rejects_after"], summary["newly_rejected"]) == (1, 2, 1)
     assert summary["not_reproduced"] == 0
@@ -176,23 +176,23 @@ def test_the_command_shows_which_fruit_change_sides_and_goes_on_where_it_was(orc
     assert "http" not in page.replace("http://www.w3.org", ""), "it needs no network"
     lines = (out / "replayed.jsonl").read_text()
     (out / "replayed.jsonl").write_text(lines + '{"sequence": 4, "lo')  # a crash in the middle of a line
-    code, told = station("whatif", "--recipe", file, "--out", out, "--jobs", 1)
+    code, output = station("whatif", "--recipe", file, "--out", out, "--jobs", 1)
     assert code == 0
-    assert "4 inspections" in told
+    assert "4 inspections" in output
     again = (out / "replayed.jsonl").read_text()
     assert again.startswith(lines)
     assert again.count("\n") == lines.count("\n") + 1
-    assert summary["marked"] is None, "nobody has said what the fruit were"
+    assert summary["marked"] is None, "no fruit is marked good or bad"
     assert station("records", "mark", 1, 3, "good")[0] == station("records", "mark", 2, "bad")[0] == 0
-    code, told = station("whatif", "--recipe", file, "--out", out, "--jobs", 1)
-    assert "marked good and diverted: 0 of 2 (0.0 to 84.2 %) before, 1 of 2 (1.3 to 98.7 %) after" in told
-    assert "marked bad and passed: 0 of 1 (0.0 to 97.5 %) before, 0 of 1 (0.0 to 97.5 %) after" in told
-    assert "now wrong: 3" in told
+    code, output = station("whatif", "--recipe", file, "--out", out, "--jobs", 1)
+    assert "marked good and diverted: 0 of 2 (0.0 to 84.2 %) before, 1 of 2 (1.3 to 98.7 %) after" in output
+    assert "marked bad and passed: 0 of 1 (0.0 to 97.5 %) before, 0 of 1 (0.0 to 97.5 %) after" in output
+    assert "now wrong: 3" in output
     assert "now wrong: 3" in (out / "whatif.html").read_text()
     assert json.loads((out / "summary.json").read_text())["marked"]["now_wrong"] == [3]
-    code, told = station("whatif", "--recipe", draft(damage__area__0__area_mm2=91.0), "--out", out)
+    code, output = station("whatif", "--recipe", draft(damage__area__0__area_mm2=91.0), "--out", out)
     assert code == 2
-    assert "it holds the results of another draft" in told
+    assert "it holds the results of another draft" in output
 
 
 def test_the_draft_is_compared_with_the_revision_that_inspected_these_fruit(orchard, draft, changed, station, tmp_path):
@@ -245,8 +245,8 @@ def test_two_processes_and_a_cluster_say_the_same_as_one(orchard, draft, station
     file = draft(damage__area__0__area_mm2=75.0)
     assert station("whatif", "--recipe", file, "--out", tmp_path / "one", "--jobs", 1)[0] == 0
     for name, how in {"two": ("--jobs", 2), "cluster": ("--scheduler", cluster)}.items():
-        code, told = apart("whatif", "--recipe", file, "--out", tmp_path / name, *how)
-        assert code == 0, told
+        code, output = apart("whatif", "--recipe", file, "--out", tmp_path / name, *how)
+        assert code == 0, output
     one, two, many = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("one", "two", "cluster"))
     assert one == two == many
     assert one["newly_rejected"] > 0
@@ -259,11 +259,11 @@ def test_a_process_that_is_killed_is_told_with_how_to_go_on():
         return future
 
     with pytest.raises(StationError, check=lambda error: error.message == messages.PROCESS_ENDED()):
-        list(runner._flow([None, None], lost, 1))  # pyrefly: ignore[bad-argument-type] (no part is looked at)
+        list(runner._flow([None, None], lost, 1))  # pyrefly: ignore[bad-argument-type] (no part is used)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (("--lots", "Z"), "no judged inspection of strawberry"),
         (("--recipe", "none.yaml"), "expected a readable file"),
@@ -271,8 +271,8 @@ def test_a_process_that_is_killed_is_told_with_how_to_go_on():
         (("--scheduler", "tcp://127.0.0.1:1"), "no Dask scheduler answers there"),
     ],
 )
-def test_bad_input_is_told(orchard, draft, station, tmp_path, arguments, told):
+def test_bad_input_is_told(orchard, draft, station, tmp_path, arguments, message):
     orchard.store([orchard.press(SOUND)])
-    code, said = station("whatif", "--recipe", draft(), "--out", tmp_path / "out", *arguments)
+    code, output = station("whatif", "--recipe", draft(), "--out", tmp_path / "out", *arguments)
     assert code == 2
-    assert told in said
+    assert message in output

@@ -2,7 +2,7 @@
 
 Every range in this file is an estimate unless a source is named. Radii, pitches and rim widths are those of the
 bodies that real sensors were pressed on; stiffnesses are chosen so that the drawn dents are as shallow as the
-real ones looked.
+real ones appeared.
 """
 
 from dataclasses import dataclass
@@ -57,7 +57,7 @@ class Foundation:
 
 @dataclass(frozen=True, slots=True)
 class SoftBody:
-    """One body, its foremost point in the middle; a rod's length lies along y."""
+    """One body, its foremost point in the middle; a rod's length is along y."""
 
     kind: SoftKind
     seed: int

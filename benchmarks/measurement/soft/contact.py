@@ -20,7 +20,7 @@ from .body import SoftBody, SoftKind
 from .skin import relief, waviness
 
 GEL_MM = (18.4, 15.8)
-"""Height and width of the gel as the image sees it; what of a body lies beyond touches nothing."""
+"""Height and width of the gel as the image sees it; the part of a body beyond touches nothing."""
 GEL_SPRING_N_PER_MM3 = 0.1
 """Stiffness of the gel's bed. An estimate: a layer of 2.27 mm of 0.12 MPa has 0.05 with free sides, 0.46 without."""
 _BENT_MM, _DRAWN_MM, _DRAWN_SHARE = 0.2, 1.2, 0.3
@@ -127,7 +127,7 @@ class SoftOnGel:
         return ((1.0 - _DRAWN_SHARE) * bent + _DRAWN_SHARE * drawn).astype(np.float32)
 
     def _seen(self, field: FloatArray) -> FloatArray:
-        """The part of a field on the gel that lies in the image."""
+        """The part of a field on the gel within the image."""
         top, left = self._margins
         return field[top : top + GRID_SHAPE[0], left : left + GRID_SHAPE[1]]
 

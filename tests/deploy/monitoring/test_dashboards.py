@@ -6,9 +6,9 @@ import time
 import pytest
 import yaml
 
-from benchmarks.monitoring.asking import DASHBOARDS, dashboards, panels
 from benchmarks.monitoring.document import headings
 from benchmarks.monitoring.prometheus import running, write_configuration
+from benchmarks.monitoring.queries import DASHBOARDS, dashboards, panels
 from deploy.grafana.boards.export import exported
 
 ROOT = DASHBOARDS.parents[2]
@@ -46,8 +46,8 @@ def test_no_shares_are_stacked():
 def test_a_dashboard_can_be_loaded(name):
     board = dashboards()[name]
     variables = {each["name"] for each in board["templating"]["list"]}
-    asked = " ".join(str(panel.data) for panel in PANELS if panel.board == name)
-    for variable in re.findall(r"\$\{?([a-z_]+)(?::\w+)?\}?", re.sub(r"\$__\w+", "", asked)):
+    queries = " ".join(str(panel.data) for panel in PANELS if panel.board == name)
+    for variable in re.findall(r"\$\{?([a-z_]+)(?::\w+)?\}?", re.sub(r"\$__\w+", "", queries)):
         assert variable in variables
     numbers = [panel.data["id"] for panel in PANELS if panel.board == name]
     assert len(set(numbers)) == len(numbers)
@@ -66,10 +66,8 @@ def test_uids_are_unique_and_datasources_are_provisioned():
     uids = [board["uid"] for board in dashboards().values()]
     assert len(set(uids)) == len(uids) == 4
     known = yaml.safe_load((PROVISIONING / "datasources" / "fruit-station.yaml").read_text())["datasources"]
-    asked = {
-        (target["datasource"]["type"], target["datasource"]["uid"]) for panel in PANELS for target in panel.targets
-    }
-    assert asked == {(each["type"], each["uid"]) for each in known}
+    used = {(target["datasource"]["type"], target["datasource"]["uid"]) for panel in PANELS for target in panel.targets}
+    assert used == {(each["type"], each["uid"]) for each in known}
     secrets = [each["secureJsonData"]["password"] for each in known if "secureJsonData" in each]
     assert all(re.fullmatch(r"\$\{\w+\}", secret) for secret in secrets)
 

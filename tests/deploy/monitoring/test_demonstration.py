@@ -1,4 +1,4 @@
-"""A real Prometheus scrapes a demonstration, which tells a real PostgreSQL: whatever is asked is answered."""
+"""A real Prometheus scrapes a demonstration, which publishes to a real PostgreSQL: every query is answered."""
 
 import math
 
@@ -6,8 +6,8 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families as parse
 
 from benchmarks.archive import postgres
-from benchmarks.monitoring.asking import panels, promql, rules, sql, used
 from benchmarks.monitoring.month import LINKS, PHASES
+from benchmarks.monitoring.queries import panels, promql, rules, sql, used
 from benchmarks.monitoring.site import STATION, WEEK, demonstration
 from station.runtime.observability.metrics_table import TABLE, exposed_name
 from tests.hosts import fresh_host
@@ -17,7 +17,7 @@ FRUITS = 3
 
 def unanswered(site):
     """Rules and panels that Prometheus has nothing for."""
-    asked = [
+    queries = [
         *((f"rule {name}", expr) for name, expr in rules()),
         *(
             (f"{panel.board}: {panel.title}", promql(target["expr"], STATION, "1m", week=WEEK))
@@ -26,8 +26,8 @@ def unanswered(site):
             if "expr" in target
         ),
     ]
-    assert len(asked) > 100
-    answers = {what: site.prometheus.now(expr, site.at_s) for what, expr in asked}
+    assert len(queries) > 100
+    answers = {what: site.prometheus.now(expr, site.at_s) for what, expr in queries}
     return [what for what, found in answers.items() if all(math.isnan(each.points[0][1]) for each in found)]
 
 
@@ -68,6 +68,6 @@ def test_every_question_is_answered_and_no_metric_is_unused(promtool, postgresql
     }
     assert {exposed_name(row) for row in TABLE.values()} <= set(scraped.values()), "a metric that never appeared"
     families = {scraped[name] for name in used(set(scraped))}
-    assert set(scraped.values()) - families == set(), "metrics that nobody asks for"
+    assert set(scraped.values()) - families == set(), "metrics that no query uses"
     values = {value for family in parse(site.metrics) for each in family.samples for value in each.labels.values()}
     assert {*LINKS, *PHASES} <= values, "the month that never was names what no station names"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.monitoring.history import NO_COMPACTION, record, told
+from benchmarks.monitoring.history import NO_COMPACTION, fired_alerts, record
 from benchmarks.monitoring.month import DAY_S, HOUR_S, Plan, troubles, write_history
 from benchmarks.monitoring.prometheus import running, write_configuration
 from station.runtime.observability.metrics_table import TABLE
@@ -11,7 +11,7 @@ BEGIN_S = 1_789_344_000
 """A midnight, UTC."""
 PLAN = Plan(BEGIN_S, days=5, step_s=240, troubles=troubles(1, 2, 3))
 LATEST_S = 1.5 * HOUR_S
-"""What is told goes on for as long at most, when its cause has gone: the windows of an hour have to pass."""
+"""An alert fires for as long at most after its cause has gone: the windows of an hour have to pass."""
 
 
 @pytest.mark.timeout(600)
@@ -21,7 +21,7 @@ def test_each_trouble_is_told_by_its_alert_and_by_no_other(promtool, tmp_path):
     assert {row.name for row in TABLE.values()} <= {family for family, _ in seen}
     record(PLAN, tmp_path)
     with running(tmp_path, write_configuration(tmp_path, "1m", {}), *NO_COMPACTION) as prometheus:
-        found = told(prometheus, PLAN)
+        found = fired_alerts(prometheus, PLAN)
         counted = prometheus.now("sum(station_inspections_total)", PLAN.end_s)
     assert counted[0].points[0][1] > 1000
     left = list(found)
@@ -30,5 +30,5 @@ def test_each_trouble_is_told_by_its_alert_and_by_no_other(promtool, tmp_path):
         its = [each for each in left if begin_s <= each.begin_s and each.end_s <= end_s]
         assert {each.alert for each in its} == set(trouble.alerts), trouble.kind
         left = [each for each in left if each not in its]
-    assert left == [], "told without a cause"
+    assert left == [], "an alert without a cause"
     assert found[0].begin_s > BEGIN_S + DAY_S, "the first day is sound"

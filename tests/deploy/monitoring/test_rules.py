@@ -7,10 +7,10 @@ import pytest
 import yaml
 
 from benchmarks.monitoring import document
-from benchmarks.monitoring.asking import unfiltered
 from benchmarks.monitoring.document import headings
 from benchmarks.monitoring.history import episodes
 from benchmarks.monitoring.prometheus import RULES, SHIPPED, recordings, shipped_alerts
+from benchmarks.monitoring.queries import unfiltered
 from station.inspection.alarm_table import ALARMS
 
 ROOT = SHIPPED.parents[1]
@@ -33,8 +33,8 @@ def test_every_alert_fires_where_it_should_and_nowhere_else(promtool):
 
 
 def test_every_alert_is_fired_by_a_rule_test():
-    told = "".join(file.read_text(encoding="utf-8") for file in (SHIPPED / "tests").glob("*.yml"))
-    assert set(re.findall(r'alertname="(\w+)"', told)) >= set(ALERTS)
+    rule_tests = "".join(file.read_text(encoding="utf-8") for file in (SHIPPED / "tests").glob("*.yml"))
+    assert set(re.findall(r'alertname="(\w+)"', rule_tests)) >= set(ALERTS)
     assert set(ALERTS) >= WANTED
 
 
@@ -59,11 +59,11 @@ def test_the_document_has_every_alert():
 
 
 def test_recorded_series_are_named_by_their_level_and_none_is_unused():
-    asked = " ".join([*recordings().values(), *(rule["expr"] for rule in ALERTS.values())])
+    queries = " ".join([*recordings().values(), *(rule["expr"] for rule in ALERTS.values())])
     boards = " ".join(file.read_text() for file in (ROOT / "deploy" / "grafana" / "dashboards").glob("*.json"))
     for name in recordings():
         assert re.fullmatch(r"[a-z_]+:[a-z_]+:[a-z0-9_]+", name)
-        assert name in asked + boards
+        assert name in queries + boards
 
 
 def test_alertmanager_wakes_for_what_is_high_and_watches_the_watchdog():
@@ -82,15 +82,15 @@ def test_alertmanager_wakes_for_what_is_high_and_watches_the_watchdog():
 
 
 @pytest.mark.parametrize(
-    ("expr", "asked"),
+    ("expr", "values"),
     [
         ('up{job="a"} == 0', 'up{job="a"} == bool 0'),
         ('sum(a{b!~"c>d"}) > 2 * c\nand d >= 1', 'sum(a{b!~"c>d"}) > bool 2 * c\nand d >= bool 1'),
         ('absent(up{job="a"})', 'up{job="a"}'),
     ],
 )
-def test_comparisons_are_asked_for_as_values(expr, asked):
-    assert unfiltered(expr) == asked
+def test_comparisons_are_asked_for_as_values(expr, values):
+    assert unfiltered(expr) == values
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ import pytest
 import yaml
 
 from benchmarks.archive import postgres
-from benchmarks.monitoring.asking import panels, sql
 from benchmarks.monitoring.prometheus import RULES
+from benchmarks.monitoring.queries import panels, sql
 from hmi.run.routes import PARTS
 from hmi.web.translation import Locale
 from station.channel.panel_run import FruitSummary
@@ -93,10 +93,10 @@ def test_the_reject_rate_in_prometheus_is_of_the_judged_fruit(promtool, tmp_path
 
 
 @pytest.mark.parametrize(
-    ("asked", "base"),
+    ("query", "base"),
     [(r"reject_ratio| AS failed", "share of the judged fruit"), (r'unjudged_ratio| AS "not judged"', "of all fruit")],
 )
-def test_a_panel_with_a_share_says_of_what(asked, base):
-    found = [panel for panel in PANELS if re.search(asked, str(panel.targets))]
+def test_a_panel_with_a_share_says_of_what(query, base):
+    found = [panel for panel in PANELS if re.search(query, str(panel.targets))]
     assert len(found) >= 4
     assert [panel.title for panel in found if base not in panel.data["description"].lower()] == []

@@ -40,7 +40,7 @@ class Bench:
         self.host = host
 
     def forgive_no_silence(self) -> None:
-        """Have the watchdog expire also where the controller stands still itself, as it does on a busy machine."""
+        """Have the watchdog expire also where the controller pauses itself, as it does on a busy machine."""
 
         def forgive_nothing(now_s: float) -> None:
             pass

@@ -134,7 +134,7 @@ class Rtde:
                 if answered == ord(kind):
                     return payload
 
-    async def ask(self, kind: str, payload: bytes = b"") -> bytes:
+    async def exchange(self, kind: str, payload: bytes = b"") -> bytes:
         self.send(kind, payload)
         return await self.hear(kind)
 
@@ -150,20 +150,20 @@ def test_the_protocol_to_the_byte(bench, until, monkeypatch):
     async def run():
         async with bench() as made:
             # By its own cycles: on a busy machine they come late, and then in a row.
-            begun_s, controller = made.clock.now_s(), made.controller
-            monkeypatch.setattr(made.clock, "now_s", lambda: begun_s + CYCLE_S * controller._tick)
+            began_s, controller = made.clock.now_s(), made.controller
+            monkeypatch.setattr(made.clock, "now_s", lambda: began_s + CYCLE_S * controller._tick)
             client = await plain(made.host)
-            assert await client.ask("V", struct.pack(">H", 1)) == b"\x00"
-            assert await client.ask("V", struct.pack(">H", 2)) == b"\x01"
-            assert struct.unpack(">4I", await client.ask("v"))[:2] == (5, 22)
-            assert await client.ask("S") == b"\x00"
-            asked = struct.pack(">d", 500.0) + b"timestamp,actual_q,no_such_thing,output_int_register_47"
-            assert await client.ask("O", asked) == b"\x00DOUBLE,VECTOR6D,NOT_FOUND,INT32"
-            asked = struct.pack(">d", 125.0) + b"timestamp,actual_q,"
-            assert await client.ask("O", asked) == b"\x01DOUBLE,VECTOR6D"
-            assert await client.ask("I", b"input_int_register_48") == b"\x00NOT_FOUND"
-            assert await client.ask("I", b"input_int_register_5,input_double_register_5,") == b"\x01INT32,DOUBLE"
-            assert await client.ask("S") == b"\x01"
+            assert await client.exchange("V", struct.pack(">H", 1)) == b"\x00"
+            assert await client.exchange("V", struct.pack(">H", 2)) == b"\x01"
+            assert struct.unpack(">4I", await client.exchange("v"))[:2] == (5, 22)
+            assert await client.exchange("S") == b"\x00"
+            outputs = struct.pack(">d", 500.0) + b"timestamp,actual_q,no_such_thing,output_int_register_47"
+            assert await client.exchange("O", outputs) == b"\x00DOUBLE,VECTOR6D,NOT_FOUND,INT32"
+            outputs = struct.pack(">d", 125.0) + b"timestamp,actual_q,"
+            assert await client.exchange("O", outputs) == b"\x01DOUBLE,VECTOR6D"
+            assert await client.exchange("I", b"input_int_register_48") == b"\x00NOT_FOUND"
+            assert await client.exchange("I", b"input_int_register_5,input_double_register_5,") == b"\x01INT32,DOUBLE"
+            assert await client.exchange("S") == b"\x01"
             stamps = []
             for _ in range(20):
                 recipe, timestamp, *joints = struct.unpack(">B7d", await client.hear("U"))
@@ -172,15 +172,15 @@ def test_the_protocol_to_the_byte(bench, until, monkeypatch):
                 stamps.append(timestamp)
             assert [b - a for a, b in itertools.pairwise(stamps)] == pytest.approx([0.008] * 19)
             other = await plain(made.host)
-            assert await other.ask("I", b"input_int_register_5") == b"\x00IN_USE"
+            assert await other.exchange("I", b"input_int_register_5") == b"\x00IN_USE"
             client.send("U", struct.pack(">Bid", 1, 42, 2.5))
-            assert await client.ask("P") == b"\x01"
+            assert await client.exchange("P") == b"\x01"
             assert made.controller.registers.input_int(5) == 42
             assert made.controller.registers.input_doubles(5, 1) == (2.5,)
             client.close()
 
             async def released() -> bool:
-                return await other.ask("I", b"input_int_register_5") == b"\x01INT32"
+                return await other.exchange("I", b"input_int_register_5") == b"\x01INT32"
 
             await until(released)
             other.close()
@@ -198,7 +198,7 @@ def test_rubbish_costs_its_sender_the_connection_and_nobody_else(bench, rubbish)
             with pytest.raises((ConnectionError, asyncio.IncompleteReadError)):
                 await asyncio.wait_for(reader.readexactly(1), 5)
             writer.transport.abort()
-            assert await other.ask("V", struct.pack(">H", 2)) == b"\x01"
+            assert await other.exchange("V", struct.pack(">H", 2)) == b"\x01"
             other.close()
 
     asyncio.run(run())
@@ -209,10 +209,10 @@ def test_the_outputs_that_the_makers_clients_ask_for_are_all_there(bench, names)
     async def run():
         async with bench() as made:
             client = await plain(made.host)
-            kinds = await client.ask("O", struct.pack(">d", 125.0) + names.replace(" ", "").encode())
+            kinds = await client.exchange("O", struct.pack(">d", 125.0) + names.replace(" ", "").encode())
             assert kinds[0] == 1, kinds
             assert len(kinds[1:].decode().split(",")) == names.count(",") + 1
-            assert await client.ask("S") == b"\x01"
+            assert await client.exchange("S") == b"\x01"
             assert len(await client.hear("U")) > 4 * names.count(",")
             client.close()
 
@@ -252,11 +252,11 @@ def test_an_output_recipe_is_no_longer_than_a_package_can_be(bench, count):
         async with bench() as made:
             client, other = await plain(made.host), await plain(made.host)
             fits = HEAD_AND_SIX[0] + HEAD_AND_SIX[1] * count <= 65535
-            asked = struct.pack(">d", 500.0) + ",".join(["actual_q"] * count).encode()
-            assert (await client.ask("O", asked))[:1] == bytes([fits])
-            assert await client.ask("S") == bytes([fits])
-            assert await other.ask("O", struct.pack(">d", 500.0) + b"timestamp") == b"\x01DOUBLE"
-            assert await other.ask("S") == b"\x01"
+            outputs = struct.pack(">d", 500.0) + ",".join(["actual_q"] * count).encode()
+            assert (await client.exchange("O", outputs))[:1] == bytes([fits])
+            assert await client.exchange("S") == bytes([fits])
+            assert await other.exchange("O", struct.pack(">d", 500.0) + b"timestamp") == b"\x01DOUBLE"
+            assert await other.exchange("S") == b"\x01"
             stamps = [struct.unpack(">Bd", await other.hear("U"))[1] for _ in range(10)]
             assert stamps == sorted(set(stamps))
             if fits:
@@ -272,8 +272,8 @@ def test_an_output_frequency_is_finite_and_at_least_one(bench, frequency_hz):
     async def run():
         async with bench() as made:
             client = await plain(made.host)
-            assert await client.ask("O", struct.pack(">d", frequency_hz) + b"timestamp") == b"\x00DOUBLE"
-            assert await client.ask("O", struct.pack(">d", 1.0) + b"timestamp") == b"\x01DOUBLE"
+            assert await client.exchange("O", struct.pack(">d", frequency_hz) + b"timestamp") == b"\x00DOUBLE"
+            assert await client.exchange("O", struct.pack(">d", 1.0) + b"timestamp") == b"\x01DOUBLE"
             client.close()
 
     asyncio.run(run())
@@ -284,8 +284,8 @@ def test_a_client_whose_package_cannot_be_made_is_cut_and_the_others_are_served(
         async with bench() as made:
             client, other = await plain(made.host), await plain(made.host)
             for one, name in ((client, b"output_int_register_3"), (other, b"timestamp")):
-                await one.ask("O", struct.pack(">d", 500.0) + name)
-                await one.ask("S")
+                await one.exchange("O", struct.pack(">d", 500.0) + name)
+                await one.exchange("S")
             made.controller.registers.output_int[3] = 1 << 40
             await until(lambda: len(made.controller.network.connections) == 1)
             stamps = [struct.unpack(">Bd", await other.hear("U"))[1] for _ in range(10)]
@@ -353,8 +353,8 @@ def test_who_stops_reading_is_dropped_after_ten_seconds(bench, until):
             reader, writer = await asyncio.open_connection(sock=sock, limit=2048)
             lazy = Rtde(reader, writer)
             names = ",".join(f"output_double_register_{i}" for i in range(48)).encode()
-            await lazy.ask("O", struct.pack(">d", 500.0) + names)
-            await lazy.ask("S")
+            await lazy.exchange("O", struct.pack(">d", 500.0) + names)
+            await lazy.exchange("S")
             (connection,) = made.controller.network.connections
             await until(lambda: connection.blocked)
             assert connection in made.controller.network.connections
@@ -408,27 +408,27 @@ def test_the_dashboard_answers_line_by_line(bench, until):
         async with bench() as made:
             reader, writer = await asyncio.open_connection(made.host, 29999)
 
-            async def ask(line: str) -> str:
+            async def query(line: str) -> str:
                 writer.write(line.encode() + b"\n")
                 return (await asyncio.wait_for(reader.readline(), 5)).decode().strip()
 
             assert (await reader.readline()).startswith(b"Connected: Universal Robots Dashboard Server")
-            assert await ask("robotmode") == "Robotmode: RUNNING"
-            assert await ask("ROBOTMODE ") == "Robotmode: RUNNING"
-            assert (await ask("dance")).startswith("could not understand")
+            assert await query("robotmode") == "Robotmode: RUNNING"
+            assert await query("ROBOTMODE ") == "Robotmode: RUNNING"
+            assert (await query("dance")).startswith("could not understand")
             made.faults.set("protective_stop")
             made.faults.clear("protective_stop")
 
             async def stopped() -> bool:
-                return await ask("safetystatus") == "Safetystatus: PROTECTIVE_STOP"
+                return await query("safetystatus") == "Safetystatus: PROTECTIVE_STOP"
 
             await until(stopped)
-            assert (await ask("unlock protective stop")).startswith("Cannot unlock")
+            assert (await query("unlock protective stop")).startswith("Cannot unlock")
             made.clock.skip(5.0)
-            assert await ask("unlock protective stop") == "Protective stop releasing"
-            assert await ask("safetystatus") == "Safetystatus: NORMAL"
+            assert await query("unlock protective stop") == "Protective stop releasing"
+            assert await query("safetystatus") == "Safetystatus: NORMAL"
             for line, answer in ur_clients.DASHBOARD.items():
-                assert await ask(line) == answer
+                assert await query(line) == answer
             assert await reader.read() == b""
             writer.transport.abort()
 
@@ -459,9 +459,9 @@ def test_the_device_check_says_what_was_found_and_what_to_do(bench, fault, verdi
                 await asyncio.sleep(0.1)
             findings = await probe_arm(made.settings())
             assert [finding.verdict for finding in findings] == verdicts
-            said = [each for finding in findings for each in (finding.found, finding.remedy) if each is not None]
-            said += [each for one in said for each in one.parameters.values() if isinstance(each, Message)]
-            assert message.id in {each.id for each in said}
+            found = [each for finding in findings for each in (finding.found, finding.remedy) if each is not None]
+            found += [each for one in found for each in one.parameters.values() if isinstance(each, Message)]
+            assert message.id in {each.id for each in found}
             assert all((finding.remedy is None) == (finding.verdict == "ok") for finding in findings)
 
     asyncio.run(run())

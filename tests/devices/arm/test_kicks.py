@@ -19,7 +19,7 @@ class Controller:
     """Both of ur-rtde's connections, and a program that plays or does not."""
 
     def __init__(self):
-        self.state, self.kicks, self.looks = PLAYING, 0, 0
+        self.state, self.kicks, self.polls = PLAYING, 0, 0
 
     def kickWatchdog(self):  # noqa: N802 (ur-rtde's name)
         self.kicks += 1
@@ -38,7 +38,7 @@ class Controller:
         return True
 
     def getRuntimeState(self):  # noqa: N802
-        self.looks += 1
+        self.polls += 1
         return self.state
 
     def __getattr__(self, name):
@@ -65,7 +65,7 @@ def prepared():
 def test_a_stop_by_the_watchdog_is_told_with_the_state_that_shows_it_also_after_a_kick_that_took_long(
     prepared, monkeypatch
 ):
-    """The controller counts from some moment of the kick, and its stop comes between two looks of this process."""
+    """The controller counts from some moment of the kick, and its stop comes between two polls of this process."""
     process, controller = prepared
     now = SimpleNamespace(s=100.0)
     monkeypatch.setattr(process_module, "time", SimpleNamespace(monotonic=lambda: now.s))
@@ -79,16 +79,16 @@ def test_a_stop_by_the_watchdog_is_told_with_the_state_that_shows_it_also_after_
 
     async def kicks_late_after(share):
         """Return whether kicks are late with a stop `share` of the watchdog's limit after the kick's begin."""
-        controller.state, controller.kicks, controller.looks, now.s = PLAYING, 0, 0, now.s + 100.0
+        controller.state, controller.kicks, controller.polls, now.s = PLAYING, 0, 0, now.s + 100.0
         assert process._prepare()
-        process._healthy_until_s, begun_s = now.s + 0.5 / WATCHDOG_HZ, now.s
+        process._healthy_until_s, began_s = now.s + 0.5 / WATCHDOG_HZ, now.s
         kicking = asyncio.create_task(process._kick(0.001))
-        while controller.looks < 2:
+        while controller.polls < 2:
             await asyncio.sleep(0)
         kicking.cancel()
         await asyncio.gather(kicking, return_exceptions=True)
         assert controller.kicks == 1
-        now.s, controller.state = begun_s + share / WATCHDOG_HZ, PLAYING - 1
+        now.s, controller.state = began_s + share / WATCHDOG_HZ, PLAYING - 1
         return (await process.beat(Beat(healthy_for_s=30.0))).kicks_late
 
     async def run():

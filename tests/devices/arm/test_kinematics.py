@@ -156,12 +156,12 @@ def test_a_stop_on_the_way_stays_on_it_and_brakes_as_asked():
     body = Body(HOME, 0.0)
     body.move_joints((1.5, -1.2, 1.5708, -1.5708, -1.5708, 0.0), 1.0, 4.0)
     simulate(body, 0.6)
-    begun, speed = np.array(body.joints_rad), body.speeds_rad_s[0]
+    before, speed = np.array(body.joints_rad), body.speeds_rad_s[0]
     assert speed == pytest.approx(1.0)
     body.brake(2.0)
     positions, speeds = simulate(body, 2.0, start_s=0.6)
     assert not body.moving
-    assert positions[-1][0] - begun[0] == pytest.approx(speed**2 / 4.0, rel=1e-3)
+    assert positions[-1][0] - before[0] == pytest.approx(speed**2 / 4.0, rel=1e-3)
     assert np.abs(np.diff(speeds[1:, 0])).max() <= 2.0 * 0.002 * 1.01
     shares = (positions[-1] - HOME)[:2] / np.array([1.5, 0.3708])
     assert shares[0] == pytest.approx(shares[1])
@@ -172,10 +172,10 @@ def test_a_straight_stop_brakes_the_tool_as_asked():
     body.move_joints((1.5, *HOME[1:]), 1.0, 4.0)
     simulate(body, 0.6)
     tool_m_s = math.hypot(*body.tool_speed()[:3])
-    begun = body.joints_rad[0]
+    before = body.joints_rad[0]
     body.brake_tool(2.0)
     positions, _ = simulate(body, 2.0, start_s=0.6)
-    assert positions[-1][0] - begun == pytest.approx(0.5 * 1.0 * tool_m_s / 2.0, rel=1e-3)
+    assert positions[-1][0] - before == pytest.approx(0.5 * 1.0 * tool_m_s / 2.0, rel=1e-3)
 
 
 def test_slowed_down_it_goes_the_same_way_for_longer():

@@ -54,9 +54,9 @@ def test_a_silent_controller_is_given_up_within_the_limit(bench, healthy):
     async def run():
         async with bench() as made, UrArm(made.settings(constructor_limit_s=5.0)) as arm, healthy(arm):
             made.faults.set("silent")
-            begun = time.monotonic()
+            began_s = time.monotonic()
             assert await cause_of(arm.ready(3.0)) is ArmCause.LINK_LOST
-            assert time.monotonic() - begun < 20.0
+            assert time.monotonic() - began_s < 20.0
             made.faults.clear("silent")
             await arm.ready(30.0)
 
@@ -81,7 +81,7 @@ ALWAYS = 1000
 
 @pytest.mark.parametrize("ended", [1, 2, ALWAYS])
 def test_a_program_that_ends_as_it_begins_is_started_again_and_then_left_to_a_person(bench, healthy, until, ended):
-    """As a link does that is cut while ur-rtde starts the program, which nobody has stopped then."""
+    """As a link does that is cut while ur-rtde starts the program, which no person has stopped then."""
 
     async def run():
         async with bench() as made:
@@ -139,7 +139,7 @@ def test_a_connection_that_the_controller_closes_is_told_by_the_process_with_its
 
 
 def test_a_stream_frozen_too_long_counts_as_a_lost_link(healthy_arm, until):
-    """ur-rtde says that it is connected all the while."""
+    """ur-rtde reports that it is connected all the while."""
 
     async def run():
         async with healthy_arm() as (bench, arm):
@@ -191,9 +191,9 @@ def test_a_stream_that_freezes_or_comes_late_is_stale(healthy_arm, until, fault)
             states: list[ArmState] = []
 
             async def is_old() -> bool:
-                asked_s = time.monotonic()
+                requested_s = time.monotonic()
                 states.append(await arm.state())
-                return asked_s > old_from_s and states[-1].age_s is not None
+                return requested_s > old_from_s and states[-1].age_s is not None
 
             await until(is_old)
             state = states[-1]

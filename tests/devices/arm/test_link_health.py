@@ -113,7 +113,7 @@ def test_a_stop_is_the_watchdogs_only_where_it_was_left_without_kicks(cause_afte
 @pytest.mark.usefixtures("dashboard_requests")
 @pytest.mark.parametrize("state", [PLAYING, STOPPED])
 def test_a_connection_that_the_controller_closed_is_lost_whatever_was_received_last(state):
-    """ur-rtde stops the program where it connects again by itself: that was nobody on the pendant."""
+    """ur-rtde stops the program where it connects again by itself: that was no person at the pendant."""
 
     async def scenario():
         arm, process = linked()

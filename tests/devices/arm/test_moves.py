@@ -53,7 +53,7 @@ def test_an_arm_that_is_there_already_is_not_sent_there_again(healthy_arm, monke
             orders.clear()
             monkeypatch.setattr(arm._link, "snapshot", stopped)
             await arm.move_to("nest")
-            assert orders == [Move], "where the program does not play, the controller's answer says so"
+            assert orders == [Move], "where the program does not play, the controller's answer shows it"
 
     asyncio.run(run())
 
@@ -160,7 +160,7 @@ def test_a_slow_arm_goes_on_at_a_fraction_of_its_speed(healthy_arm, until):
 
             async def at_a_fifth() -> bool:
                 if move.done():
-                    await move  # which says why
+                    await move  # which raises the reason
                 return max(map(abs, bench.controller.body.speeds_rad_s)) == pytest.approx(0.4, rel=1e-3)
 
             await until(at_a_fifth)

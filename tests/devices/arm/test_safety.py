@@ -78,7 +78,7 @@ class SafetyMachine(RuleBasedStateMachine):
             assert not self.safety.powered
 
     @invariant()
-    def the_bits_say_what_the_mode_says(self):
+    def the_bits_agree_with_the_mode(self):
         normal = self.safety.safety_mode is SafetyMode.NORMAL
         assert bool(self.safety.bits & 1) == normal
         assert bool(self.safety.bits & 1 << 10) != normal

@@ -4,13 +4,13 @@ import subprocess
 import sys
 
 PR_GET_TIMERSLACK = 30
-ASKS = f"""
+PRINT_SLACKS = f"""
 import ctypes, threading
 from station.devices.arm.process import TIMER_SLACK_NS, relax_timers
-ask = lambda: found.append(ctypes.CDLL(None).prctl({PR_GET_TIMERSLACK}))
+read = lambda: found.append(ctypes.CDLL(None).prctl({PR_GET_TIMERSLACK}))
 found = []
 relax_timers()
-for thread in [threading.Thread(target=ask)]:
+for thread in [threading.Thread(target=read)]:
     thread.start()
     thread.join()
 print(found == [TIMER_SLACK_NS], found)
@@ -18,5 +18,5 @@ print(found == [TIMER_SLACK_NS], found)
 
 
 def test_threads_that_ur_rtde_starts_later_are_woken_loosely_too():
-    told = subprocess.run([sys.executable, "-c", ASKS], capture_output=True, text=True, check=True).stdout
-    assert told.startswith("True"), told
+    output = subprocess.run([sys.executable, "-c", PRINT_SLACKS], capture_output=True, text=True, check=True).stdout
+    assert output.startswith("True"), output

@@ -159,7 +159,7 @@ def test_local_control_is_named_and_the_program_comes_back_after_it(healthy_arm,
             bench.faults.clear("local_mode")
             await until(lambda: bench.controller.safety.remote)
             caplog.clear()
-            # The script connection was dropped: ur-rtde's reuploadScript says True, and nothing plays.
+            # The script connection was dropped: ur-rtde's reuploadScript returns True, and nothing plays.
             await arm.upload_again()
             assert caplog.messages == ["arm link: ready"], "the first attempt's failure is no other fault"
             await arm.move_to("accept")

@@ -1,4 +1,4 @@
-"""Straight motions of the tool: chosen by the arm's position, whatever pose it was sent to before."""
+"""Straight motions of the tool: chosen by the arm's position, not by the pose that it was sent to before."""
 
 import asyncio
 from typing import Any
@@ -62,7 +62,7 @@ class Link:
 def is_straight():
     """Return a check that the arm goes straight to a pose from where it was found after its last motion."""
 
-    def ask(last, found_rad, pose):
+    def check(last, found_rad, pose):
         async def run():
             arm: Any = UrArm(SETTINGS)
             arm._link = link = Link()
@@ -79,7 +79,7 @@ def is_straight():
 
         return asyncio.run(run())
 
-    return ask
+    return check
 
 
 @pytest.mark.parametrize(

@@ -215,14 +215,14 @@ def test_a_frame_has_the_time_at_which_it_came_in_and_a_queued_one_does_not_pass
         settings = CameraSettings(driver="digit", open_deadline_s=20.0)
         camera = DigitCamera(settings, listing, lambda _: StampedCapture())
         await camera.open()
-        asked_s = time.monotonic()
-        frame = await camera.frame(asked_s, 20.0)
+        requested_s = time.monotonic()
+        frame = await camera.frame(requested_s, 20.0)
         read_s = time.monotonic()
         await camera.close()
-        return asked_s, frame, read_s
+        return requested_s, frame, read_s
 
-    asked_s, frame, read_s = asyncio.run(play())
-    assert asked_s < frame.captured_s <= read_s - 0.5, "captured after it was asked for, long before it was read"
+    requested_s, frame, read_s = asyncio.run(play())
+    assert requested_s < frame.captured_s <= read_s - 0.5, "captured after it was requested, long before it was read"
     assert FrameFault.STALE in frame.faults
 
 

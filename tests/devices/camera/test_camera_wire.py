@@ -65,9 +65,9 @@ def test_frames_come_in_order_fresh_and_healthy(bench):
         async with bench() as one:
             await one.camera.open()
             await one.camera.open()
-            asked_s = time.monotonic()
+            requested_s = time.monotonic()
             frames = [await fresh(one.camera) for _ in range(5)]
-            assert all(frame.captured_s > asked_s for frame in frames)
+            assert all(frame.captured_s > requested_s for frame in frames)
             assert [frame.sequence for frame in frames] == sorted({frame.sequence for frame in frames})
             assert len({frame.image.tobytes() for frame in frames}) == 5
             for frame in frames:
@@ -136,10 +136,10 @@ def test_without_frames_the_wait_ends_at_its_deadline_and_the_camera_comes_back(
             with pytest.raises(NoFrameError) as caught:
                 await fresh(one.camera, 0.5)
             assert time.monotonic() - began_s < 5
-            said = caught.value.message
-            assert said.id == messages.NO_FRAME.id
-            assert said.parameters["camera"] == messages.TWIN(address=f"127.0.0.1:{one.server.port}")
-            reasons = said.parameters["reasons"]
+            message = caught.value.message
+            assert message.id == messages.NO_FRAME.id
+            assert message.parameters["camera"] == messages.TWIN(address=f"127.0.0.1:{one.server.port}")
+            reasons = message.parameters["reasons"]
             assert isinstance(reasons, tuple)
             newest, *troubles = [reason.id for reason in reasons]
             assert newest == messages.NEWEST.id
@@ -187,10 +187,10 @@ def test_a_delayed_frame_is_not_fresh(bench):
             await one.camera.open()
             one.server.faults.set("delayed", 0.8)
             await until(one.camera, lambda frame: FrameFault.STALE in frame.faults)
-            asked_s = time.monotonic()
-            frame = await one.camera.frame(asked_s, 5.0)
-            assert time.monotonic() - asked_s >= 0.8
-            assert frame.captured_s > asked_s
+            requested_s = time.monotonic()
+            frame = await one.camera.frame(requested_s, 5.0)
+            assert time.monotonic() - requested_s >= 0.8
+            assert frame.captured_s > requested_s
 
     asyncio.run(play())
 
@@ -251,7 +251,7 @@ def test_nobody_there_is_said_with_a_remedy(twin_settings):
 
 
 @pytest.mark.parametrize(
-    ("header", "said"),
+    ("header", "message"),
     [
         (b"{", messages.UNREADABLE_HEADER),
         (b"[" * 4000, messages.UNREADABLE_HEADER),
@@ -267,7 +267,7 @@ def test_nobody_there_is_said_with_a_remedy(twin_settings):
         (b'{"kind": "frame", "height": 2, "width": 2, "sequence": 1, "age_s": 0, "bytes": 11}', messages.WRONG_LENGTH),
     ],
 )
-def test_a_peer_gone_mad_is_described(twin_settings, header, said):
+def test_a_peer_gone_mad_is_described(twin_settings, header, message):
     async def answer(reader, writer):
         with contextlib.closing(writer):
             writer.write(struct.pack(">I", len(header)) + header)
@@ -276,7 +276,7 @@ def test_a_peer_gone_mad_is_described(twin_settings, header, said):
     async def play():
         server = await asyncio.start_server(answer, "127.0.0.1", 0)
         async with server:
-            assert (await refusal(twin_settings, server.sockets[0].getsockname()[1])).id == said.id
+            assert (await refusal(twin_settings, server.sockets[0].getsockname()[1])).id == message.id
 
     asyncio.run(play())
 
@@ -333,8 +333,10 @@ def test_a_request_nested_too_deep_is_refused_and_the_camera_goes_on(bench):
     asyncio.run(play())
 
 
-@pytest.mark.parametrize(("hold_s", "said"), [(0.0, messages.LINK_CLOSED()), (30.0, messages.LINK_SILENT(limit_s=0.2))])
-def test_a_peer_that_hangs_up_or_says_nothing_is_told_in_words(twin_settings, monkeypatch, hold_s, said):
+@pytest.mark.parametrize(
+    ("hold_s", "message"), [(0.0, messages.LINK_CLOSED()), (30.0, messages.LINK_SILENT(limit_s=0.2))]
+)
+def test_a_peer_that_hangs_up_or_says_nothing_is_told_in_words(twin_settings, monkeypatch, hold_s, message):
     monkeypatch.setattr("station.devices.camera.twin._SILENCE_S", 0.2)
 
     async def answer(reader, writer):
@@ -345,7 +347,7 @@ def test_a_peer_that_hangs_up_or_says_nothing_is_told_in_words(twin_settings, mo
     async def play():
         server = await asyncio.start_server(answer, "127.0.0.1", 0)
         async with server:
-            assert await refusal(twin_settings, server.sockets[0].getsockname()[1]) == said
+            assert await refusal(twin_settings, server.sockets[0].getsockname()[1]) == message
 
     asyncio.run(play())
 
@@ -376,7 +378,7 @@ def test_the_probe_tells_a_good_camera_a_sick_one_and_none(bench, twin_settings)
         async with bench() as one:
             settings = twin_settings(one.server.port)
             [good] = await probe_camera(settings)
-            # A busy machine delivers fewer frames than were promised, and the probe says so.
+            # A busy machine delivers fewer frames than were promised, and the probe reports it.
             assert good.verdict == "ok" or good.remedy == messages.REMEDY_SLOW(rate=30.0)
             assert (good.found.parameters["width_px"], good.found.parameters["height_px"]) == (480, 640)
             one.server.faults.set("frame_black")

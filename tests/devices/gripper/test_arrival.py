@@ -72,12 +72,12 @@ def test_fingers_that_arrived_are_not_late_because_their_answers_are_read_late()
 def test_a_moving_gripper_is_asked_as_often_as_it_refreshes_however_long_an_answer_takes(
     monkeypatch, answers_in_s, every_s
 ):
-    now_s, asked_s = 100.0, list[float]()
+    now_s, polled_s = 100.0, list[float]()
 
     class TimedLink(ScriptedLink):
         async def status(self) -> Status:
             nonlocal now_s
-            asked_s.append(now_s)
+            polled_s.append(now_s)
             now_s += answers_in_s
             return await super().status()
 
@@ -89,7 +89,7 @@ def test_a_moving_gripper_is_asked_as_often_as_it_refreshes_however_long_an_answ
     monkeypatch.setattr(robotiq.asyncio, "sleep", sleep)
     moving = replace(START, echo=TARGET, object_=0, position=51)
     assert moved(TimedLink(START, moving, moving, replace(START, echo=TARGET, position=TARGET))) == TARGET
-    assert [after - before for before, after in pairwise(asked_s[1:])] == pytest.approx([every_s] * 2)
+    assert [after - before for before, after in pairwise(polled_s[1:])] == pytest.approx([every_s] * 2)
 
 
 @pytest.mark.parametrize(

@@ -50,11 +50,11 @@ def test_a_fruit_is_closed_on_in_steps_of_a_millimetre_and_the_width_is_measured
         rig.load(Spring(free_mm=DIGIT_MM + 44.0, stiffness_n_per_mm=1.5))
         await gripper.move_to_width(47.0, 150.0, 20.0)
         widths_mm = []
-        for asked_mm in range(46, 32, -1):
+        for target_mm in range(46, 32, -1):
             began_s = time.monotonic()
-            result = await gripper.move_to_width(asked_mm, 60.0, 20.0)
+            result = await gripper.move_to_width(target_mm, 60.0, 20.0)
             assert result.reading.object_state == ObjectState.AT_POSITION
-            assert abs(result.width_mm - asked_mm) <= HALF_COUNT_MM + 1e-6
+            assert abs(result.width_mm - target_mm) <= HALF_COUNT_MM + 1e-6
             assert began_s <= result.reading.at_s <= time.monotonic()
             true_mm = rig.twin.opening_mm(rig.clock.now_s()) - DIGIT_MM
             assert abs(result.width_mm - true_mm) <= HALF_COUNT_MM + 1e-6
@@ -81,7 +81,7 @@ def test_current_is_read_where_the_wire_carries_it(on_wire: OnWire, wire: str):
     async def scenario(rig: Any) -> list[float | None]:
         moving = asyncio.create_task(rig.driver.move_to_width(0.0, 40.0, 20.0))
         await rig.until(lambda: rig.twin.status().current > 0)
-        rig.clock.hold()  # what the wire carries is the same now, however late it is asked
+        rig.clock.hold()  # what the wire carries is the same now, however late it is read
         current_a = (await rig.driver.read()).current_a
         rig.clock.go_on()
         await rig.driver.stop()

@@ -43,7 +43,7 @@ DIGIT_MM = 32.0
 
 
 async def under_way(rig: Any) -> asyncio.Task[Any]:
-    """A slow closing move that has begun."""
+    """A slow closing move that has started."""
     moving = asyncio.create_task(rig.driver.move_to_width(0.0, 20.0, 20.0))
     await rig.until(lambda: rig.twin.status().go_to)
     return moving
@@ -283,7 +283,7 @@ async def reached(rig: Any) -> Any:
 
 def test_what_comes_and_goes_gives_errors_and_then_readings(on_wire: OnWire):
     async def scenario(rig: Any) -> None:
-        # There for longer than the driver waits for an answer and for a quiet line together: with a period of just
+        # There for longer than the driver waits for an answer and for a silent line together: with a period of just
         # these two, every request of the driver would fall into a silence.
         rig.faults.set("intermittent", 4.0)
         seen = set()

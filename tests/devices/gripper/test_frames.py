@@ -37,45 +37,45 @@ class Line:
         self.object = Spring(free_mm=held_mm + 0.05, stiffness_n_per_mm=5000.0)
         self.framer = RequestFramer()
 
-    def ask(self, request: str) -> str:
+    def exchange(self, request: str) -> str:
         frames = self.framer.feed(bytes.fromhex(request), self.clock.now_s())
         answers = [answer(frame, self.gripper) for frame in frames]
         return b"".join(one for one in answers if one).hex(" ").upper()
 
     def activated(self) -> "Line":
-        self.ask(framed(bytes.fromhex("09 10 03 E8 00 03 06 01 00 00 00 00 00")).hex())
+        self.exchange(framed(bytes.fromhex("09 10 03 E8 00 03 06 01 00 00 00 00 00")).hex())
         self.clock.advance(3.0)
         return self
 
 
 def test_the_manual_s_activation():
     line = Line()
-    assert line.ask(RESET) == ACKNOWLEDGED
-    assert line.ask("09 10 03 E8 00 03 06 01 00 00 00 00 00 72 E1") == ACKNOWLEDGED
-    assert line.ask(READ_ONE) == "09 03 02 11 00 55 D5"
+    assert line.exchange(RESET) == ACKNOWLEDGED
+    assert line.exchange("09 10 03 E8 00 03 06 01 00 00 00 00 00 72 E1") == ACKNOWLEDGED
+    assert line.exchange(READ_ONE) == "09 03 02 11 00 55 D5"
     line.clock.advance(3.0)
-    assert line.ask(READ_ONE) == "09 03 02 31 00 4C 15"
+    assert line.exchange(READ_ONE) == "09 03 02 31 00 4C 15"
 
 
 def test_the_manual_s_grip():
     line = Line().activated()
     line.gripper.load = line.object
-    assert line.ask(CLOSE) == ACKNOWLEDGED
+    assert line.exchange(CLOSE) == ACKNOWLEDGED
     line.clock.advance(0.0027)
-    assert line.ask(READ_THREE) == "09 03 06 39 00 00 FF 0E 0A F7 8B"
+    assert line.exchange(READ_THREE) == "09 03 06 39 00 00 FF 0E 0A F7 8B"
     line.clock.advance(3.0)
-    assert line.ask(READ_THREE) == "09 03 06 B9 00 00 FF BD 00 1D 7C"
-    assert line.ask("09 04 07 D0 00 03 B1 CE") == "09 04 06 B9 00 00 FF BD 00 5C 9A"
+    assert line.exchange(READ_THREE) == "09 03 06 B9 00 00 FF BD 00 1D 7C"
+    assert line.exchange("09 04 07 D0 00 03 B1 CE") == "09 04 06 B9 00 00 FF BD 00 5C 9A"
 
 
 def test_the_manual_s_opening():
     line = Line().activated()
-    line.ask(CLOSE)
+    line.exchange(CLOSE)
     line.clock.advance(3.0)
-    assert line.ask(OPEN) == ACKNOWLEDGED
+    assert line.exchange(OPEN) == ACKNOWLEDGED
     line.clock.advance(3.0)
-    assert line.ask(READ_THREE) == "09 03 06 F9 00 00 00 0D 00 56 4C"
-    assert line.ask("09 04 07 D0 00 03 B1 CE") == "09 04 06 F9 00 00 00 0D 00 17 AA"
+    assert line.exchange(READ_THREE) == "09 03 06 F9 00 00 00 0D 00 56 4C"
+    assert line.exchange("09 04 07 D0 00 03 B1 CE") == "09 04 06 F9 00 00 00 0D 00 17 AA"
 
 
 def test_the_manual_s_close_is_answered_byte_for_byte_on_every_wire(on: Callable[..., Any]):
@@ -104,7 +104,7 @@ def test_the_manual_s_close_is_answered_byte_for_byte_on_every_wire(on: Callable
 )
 def test_what_is_refused_and_how(request_: str, reply: str):
     expected = framed(bytes.fromhex(reply)).hex(" ").upper() if reply else ""
-    assert Line().ask(framed(bytes.fromhex(request_)).hex()) == expected
+    assert Line().exchange(framed(bytes.fromhex(request_)).hex()) == expected
 
 
 @given(
@@ -127,8 +127,8 @@ def test_each_bit_of_the_action_is_where_the_manual_has_it():
 def test_function_23_writes_before_it_reads_and_writes_nothing_when_the_read_is_refused():
     line = Line()
     write = "03 E8 00 03 06 01 00 00 37 00 00"
-    assert line.ask(framed(bytes.fromhex(f"09 17 07 D0 00 09 {write}")).hex())[:8] == "09 97 02"
-    assert line.ask(framed(bytes.fromhex(f"09 17 07 D0 00 02 {write}")).hex())[:20] == "09 17 04 11 00 00 37"
+    assert line.exchange(framed(bytes.fromhex(f"09 17 07 D0 00 09 {write}")).hex())[:8] == "09 97 02"
+    assert line.exchange(framed(bytes.fromhex(f"09 17 07 D0 00 02 {write}")).hex())[:20] == "09 17 04 11 00 00 37"
 
 
 @given(st.binary(max_size=64))
@@ -155,4 +155,4 @@ def test_noise_is_no_frame_and_a_silence_heals_the_line(noise: bytes):
 
 
 def test_a_wrong_crc_is_met_with_silence():
-    assert Line().ask("09 03 07 D0 00 01 85 CE") == ""
+    assert Line().exchange("09 03 07 D0 00 01 85 CE") == ""

@@ -11,7 +11,7 @@ from station.devices.gripper.robotiq import STRIDE_MM
 
 SPEED_MM_S, FROM_MM, TO_MM = 20.0, 45.0, 5.0
 COUNT_MM = 85 / 227
-ASKED_EVERY_S = 0.02
+POLLED_EVERY_S = 0.02
 """The fingers' time from one question of the driver to the next, of which a busy machine would take more."""
 CLOSES = f"""
 import asyncio, sys
@@ -55,11 +55,11 @@ def test_they_do_not_stop_on_the_way_that_they_are_sent_stride_by_stride(on_wire
             places.append((rig.twin.status().object_, command.position))
             write(command)
 
-        async def asked():
-            rig.clock.skip(ASKED_EVERY_S)
+        async def polled():
+            rig.clock.skip(POLLED_EVERY_S)
             return await status()
 
-        rig.twin.write, rig.driver.link.status = written, asked
+        rig.twin.write, rig.driver.link.status = written, polled
         moved = await rig.driver.move_to_width(TO_MM, SPEED_MM_S, 20.0)
         assert moved.reading.width_mm == pytest.approx(TO_MM, abs=COUNT_MM)
         targets = [position for _, position in places]

@@ -138,14 +138,14 @@ def test_current_is_drawn_while_moving_and_more_under_load():
 @given(st.lists(st.floats(0.001, 0.5), max_size=12), st.floats(5.0, 80.0), st.floats(0.5, 50.0))
 @example([0.29651618690593334, 0.29651618690593334, 0.5], 40.0, 0.5)
 def test_where_the_fingers_stop_does_not_depend_on_how_often_one_looks(
-    looks_s: list[float], free_mm: float, stiffness: float
+    waits_s: list[float], free_mm: float, stiffness: float
 ):
     watched, alone = Twin(Spring(free_mm, stiffness)), Twin(Spring(free_mm, stiffness))
     for twin in (watched, alone):
         twin.gripper.write(CLOSE)
-    for look_s in looks_s:
-        watched.after(look_s)
-    assert watched.after(10.0).object_ == alone.after(10.0 + sum(looks_s)).object_
+    for wait_s in waits_s:
+        watched.after(wait_s)
+    assert watched.after(10.0).object_ == alone.after(10.0 + sum(waits_s)).object_
     assert watched.opening_mm == pytest.approx(alone.opening_mm, abs=0.005)
 
 
@@ -235,7 +235,7 @@ def test_stuck_slow_and_wrong(twin: Twin):
 
 
 class Registers(RuleBasedStateMachine):
-    """Whatever a master writes and whatever happens, the registers stay what the manual allows."""
+    """With any writes of a master and any events, the registers stay what the manual allows."""
 
     @initialize()
     def begin(self):

@@ -47,7 +47,7 @@ def test_every_command_answers_what_the_document_says(serve, mbpoll):
                         polled = command[command.index("-r") + 1] in {"103", "106", "112", "128"}
                         assert polled, f"{shlex.join(command)}: {got}"
                         await asyncio.sleep(0.05)
-            return rig.commands, rig.begun, rig.state.queue
+            return rig.commands, rig.accepted, rig.state.queue
 
     assert asyncio.run(main()) == ([("change_recipe", 3)], [(7, 0, "")], ())
 

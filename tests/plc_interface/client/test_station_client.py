@@ -32,10 +32,10 @@ def test_an_inspection_in_either_word_order(serve, order):
             await client.latch_lot("LOT-1")
             result = await client.inspect(7, encoder=0x12345678)
             after = await client.pending_result()
-            return rig.begun, result, after, await client.counters()
+            return rig.accepted, result, after, await client.counters()
 
-    begun, result, after, counters = asyncio.run(main())
-    assert begun == [(7, 0x12345678, "LOT-1")]
+    accepted, result, after, counters = asyncio.run(main())
+    assert accepted == [(7, 0x12345678, "LOT-1")]
     assert (result.sequence, result.trigger_id, result.outcome, result.passed) == (0x00010001, 7, "PASS", True)
     assert result.flags == {"pass", "area_valid", "simulated"}
     assert (result.area_mm2, result.area_px, result.closing_mm, result.confidence_pct) == (12.34, 70_001, 0.75, 87)
@@ -143,16 +143,16 @@ def test_a_result_that_comes_too_late_is_not_the_next_fruits(serve):
 
 
 @pytest.mark.parametrize(
-    ("trigger_id", "says"), [(0, "is no trigger id"), (65_536, "is no trigger id"), (7, "another")]
+    ("trigger_id", "message"), [(0, "is no trigger id"), (65_536, "is no trigger id"), (7, "another")]
 )
-def test_a_trigger_that_could_only_be_refused_is_not_given(serve, trigger_id, says):
+def test_a_trigger_that_could_only_be_refused_is_not_given(serve, trigger_id, message):
     async def main():
         async with serve() as rig, StationClient(HOST, rig.port) as client:
             await client.arm()
             await client.inspect(7)
-            with pytest.raises(NotReadyError, match=says):
+            with pytest.raises(NotReadyError, match=message):
                 await client.inspect(trigger_id)
-            return len(rig.begun), await client.read("count_triggers")
+            return len(rig.accepted), await client.read("count_triggers")
 
     assert asyncio.run(main()) == (1, 1)
 
@@ -162,7 +162,7 @@ def test_without_arming_nothing_is_triggered(serve):
         async with serve() as rig, StationClient(HOST, rig.port) as client:
             with pytest.raises(NotReadyError, match=r"arm\(\)"):
                 await client.inspect(7)
-            return rig.begun
+            return rig.accepted
 
     assert asyncio.run(main()) == []
 
@@ -226,7 +226,7 @@ def test_a_heartbeat_that_ended_is_reported_and_armed_again_it_beats_again(serve
             await client.write({"write_key": 0})  # the next beat is refused, as it is beside another writer
             with pytest.raises(NotReadyError, match=r"heartbeat has ended \(.* exception 06: .*call arm\(\) again"):
                 await inspect_until_it_is_not_ready(client)
-            assert rig.begun == []
+            assert rig.accepted == []
             await client.arm()
             await beats_on(client)
             return await client.inspect(7)
@@ -304,13 +304,13 @@ def test_the_other_word_order_is_found(serve, order):
     asyncio.run(main())
 
 
-@pytest.mark.parametrize(("shift", "says"), [(1, "above where the map has it"), (-1, "below where the map has it")])
-def test_an_address_that_is_off_by_one_is_found(serve, monkeypatch, shift, says):
+@pytest.mark.parametrize(("shift", "message"), [(1, "above where the map has it"), (-1, "below where the map has it")])
+def test_an_address_that_is_off_by_one_is_found(serve, monkeypatch, shift, message):
     async def main():
         async with serve() as rig:
             read = rig.image.registers
             monkeypatch.setattr(rig.image, "registers", lambda address, count: read(address - shift, count))
-            with pytest.raises(ReferencesError, match=says):
+            with pytest.raises(ReferencesError, match=message):
                 await StationClient(HOST, rig.port).connect()
 
     asyncio.run(main())
@@ -386,7 +386,7 @@ def test_nobody_there_and_a_link_that_breaks(serve, unused_port):
 
 
 def test_a_result_of_another_fruit_is_never_returned(serve):
-    """A station gone mad: the result block shows another id under the sequence that was begun."""
+    """A station gone mad: the result block shows another id under the sequence that was started."""
 
     async def main():
         async with serve() as rig, StationClient(HOST, rig.port) as client:

@@ -62,7 +62,7 @@ class Bench:
         return state.model_copy(update=changes)
 
     def link(self, opened: Open | None = None, **changes: Any) -> tuple[do.Action, ...]:
-        """A beat, and the answer to what it asks."""
+        """A beat, and the answer to its request."""
         self.feed(ev.Beat, self.station_state(**changes))
         assert self.state.open_request is not None
         return self.feed(ev.OpenAnswered, self.state.open_request, opened or Open(running=None, outcomes=()))
@@ -85,7 +85,7 @@ class Bench:
 
     def outcome(self, name: str = "PASS", *reasons: Reason, **changes: Any) -> Outcome:
         running = ScriptedStation("")
-        running.running, running.begun = 41, {41: Begin(trigger_id=7, encoder=0, lot="")}
+        running.running, running.accepted = 41, {41: Begin(trigger_id=7, encoder=0, lot="")}
         return running.finish(name, *reasons, **changes)
 
 

@@ -77,7 +77,7 @@ class Play:
         elif state.command_request is not None and rng.random() < 0.5:
             event = ev.CommandAnswered(at, state.command_request, done=rng.random() < 0.7, why="")
         elif state.pending is not None and rng.random() < 0.6:
-            event = self.begun(state.pending.number)
+            event = self.begin_answered(state.pending.number)
         elif state.running is not None and rng.random() < 0.4:
             event = ev.OutcomeReceived(at, self.outcome(state.running.sequence, state.running.trigger_id))
         return event
@@ -99,7 +99,7 @@ class Play:
             ev.ShuttingDown(at) if rng.random() < 0.1 else ev.Tick(at),
         ))  # fmt: skip
 
-    def begun(self, number: int) -> ev.Event:
+    def begin_answered(self, number: int) -> ev.Event:
         """Draw the answer to a trigger."""
         drawn = self.rng.random()
         if drawn < 0.1:

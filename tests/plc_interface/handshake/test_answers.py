@@ -1,4 +1,4 @@
-"""Answers of the station, and those that do not come: what is counted and kept of them."""
+"""Answers of the station, and those that do not come: what is counted and stored of them."""
 
 import pytest
 
@@ -12,7 +12,7 @@ from station.channel.line import BeginReply, CommandName, Refusal
 from station.messages.message import verbatim
 
 
-def asked(bench, journal=None, trigger_id=7):
+def with_pending_trigger(bench, journal=None, trigger_id=7):
     """Return a bench whose trigger the station has not answered."""
     made = bench(journal)
     made.armed()
@@ -23,7 +23,7 @@ def asked(bench, journal=None, trigger_id=7):
 
 @pytest.mark.parametrize(("refusal", "synchronised"), [(Refusal.BUSY, False), (Refusal.NOT_READY, True)])
 def test_a_station_that_is_busy_unasked_is_asked_what_it_has_open(bench, refusal, synchronised):
-    made = asked(bench)
+    made = with_pending_trigger(bench)
     made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(refusal=refusal))
     assert made.state.last_refusal is refusal
     assert (made.state.open_request is None) is synchronised
@@ -31,7 +31,7 @@ def test_a_station_that_is_busy_unasked_is_asked_what_it_has_open(bench, refusal
 
 @pytest.mark.parametrize("reply", [BeginReply(sequence=41, refusal=Refusal.BUSY), BeginReply()])
 def test_an_answer_that_says_both_or_nothing_accepts_no_trigger(bench, reply):
-    made = asked(bench)
+    made = with_pending_trigger(bench)
     made.feed(ev.BeginAnswered, made.state.pending.number, reply)
     assert made.state.inspection is Inspection.NONE
     assert made.state.last_refusal is (reply.refusal or Refusal.NOT_READY)
@@ -39,7 +39,7 @@ def test_an_answer_that_says_both_or_nothing_accepts_no_trigger(bench, reply):
 
 
 def test_the_last_eight_triggers_whose_acceptance_is_unknown_are_remembered(bench):
-    made = asked(bench, Journal(disowned=tuple(range(101, 109))))
+    made = with_pending_trigger(bench, Journal(disowned=tuple(range(101, 109))))
     made.feed(ev.BeginFailed, made.state.pending.number)
     assert made.state.journal.disowned == (*range(102, 109), 7)
 
@@ -71,8 +71,8 @@ def test_so_many_outcomes_are_kept_for_a_station_that_notes_none(bench):
     made = bench()
     made.run()
     outcome = made.outcome()
-    kept = tuple(outcome.model_copy(update={"sequence": number}) for number in range(1, MOST_UNNOTED + 1))
-    made = bench(Journal(verdicts=kept, highest=MOST_UNNOTED))
+    verdicts = tuple(outcome.model_copy(update={"sequence": number}) for number in range(1, MOST_UNNOTED + 1))
+    made = bench(Journal(verdicts=verdicts, highest=MOST_UNNOTED))
     assert MOST_UNNOTED == 64
     made.run(sequence=100)
     made.feed(ev.OutcomeReceived, outcome.model_copy(update={"sequence": 100}))

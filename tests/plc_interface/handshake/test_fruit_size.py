@@ -10,9 +10,9 @@ from station.channel.line import BeginReply, Refusal
 NONE = (0, 0)
 
 
-def asked(made):
-    """Sizes of the inspections that the station was asked for."""
-    return [(ask.fruit_length_mm_x10, ask.size_class) for ask in made.of(do.RequestBegin)]
+def requested_sizes(made):
+    """Sizes of the inspections that were requested of the station."""
+    return [(request.fruit_length_mm_x10, request.size_class) for request in made.of(do.RequestBegin)]
 
 
 def end(made, sequence):
@@ -37,7 +37,7 @@ def test_a_size_may_come_with_the_trigger_or_before_it(bench):
     made.write("enable", size_class=2)
     made.feed(ev.PlcWrote, made.inputs, frozenset({"plc_heartbeat"}))
     made.write("enable", "trigger", trigger_id=2)
-    assert asked(made) == [(480, 3), (455, 2)]
+    assert requested_sizes(made) == [(480, 3), (455, 2)]
 
 
 def test_a_size_that_is_not_written_again_is_not_the_next_fruits_and_the_same_one_written_again_is(bench):
@@ -48,8 +48,8 @@ def test_a_size_that_is_not_written_again_is_not_the_next_fruits_and_the_same_on
     made.write("enable", "trigger", trigger_id=2)
     end(made, 102)
     made.write("enable", "trigger", trigger_id=3, fruit_length_mm_x10=480)
-    assert made.inputs.size_class == 3, "it stands in its register"
-    assert asked(made) == [(480, 3), NONE, (480, 0)]
+    assert made.inputs.size_class == 3, "it is still in its register"
+    assert requested_sizes(made) == [(480, 3), NONE, (480, 0)]
 
 
 def test_a_refused_trigger_uses_the_size_up_as_well(bench):
@@ -59,7 +59,7 @@ def test_a_refused_trigger_uses_the_size_up_as_well(bench):
     assert made.state.last_refusal is Refusal.BAD_TRIGGER_ID
     made.write("enable")
     made.write("enable", "trigger", trigger_id=2)
-    assert asked(made) == [NONE]
+    assert requested_sizes(made) == [NONE]
 
 
 @pytest.mark.parametrize("written", ["before", "with a trigger bit that is still up"])
@@ -80,5 +80,5 @@ def test_a_size_of_another_writer_is_forgotten(bench, written):
         made.write()
     made.write("enable")
     made.write("enable", "trigger", trigger_id=2)
-    assert asked(made)[-1] == NONE
+    assert requested_sizes(made)[-1] == NONE
     assert made.state.size == Size()

@@ -8,7 +8,7 @@ import pytest
 from tests.plc_interface.handshake.played_handshake import Play
 
 GOLDEN = Path(__file__).parent / "golden"
-"""`python -m tests.plc_interface.handshake.test_played_handshake` writes them anew: then look at each difference."""
+"""`python -m tests.plc_interface.handshake.test_played_handshake` writes them anew: then check each difference."""
 SEEDS = range(8)
 
 

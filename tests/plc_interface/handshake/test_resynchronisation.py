@@ -1,4 +1,4 @@
-"""A start from the journal, and what the station says it holds open, settled."""
+"""A start from the journal, and what the station reports as open, settled."""
 
 import pytest
 
@@ -35,11 +35,11 @@ def test_an_inspection_that_may_be_the_pending_triggers_is_its_own_once_the_stat
     made.armed()
     made.write("enable", "trigger", trigger_id=6)
     made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(refusal=Refusal.BUSY))
-    asked = made.state.open_request
+    number = made.state.open_request
     made.write("enable")
     made.write("enable", "trigger", trigger_id=7)
     pending = made.state.pending.number
-    made.feed(ev.OpenAnswered, asked, Open(running=(42, 7), outcomes=()))
+    made.feed(ev.OpenAnswered, number, Open(running=(42, 7), outcomes=()))
     assert not made.of(do.NotifyPublished), "nothing is called off"
     made.feed(ev.BeginAnswered, pending, BeginReply(sequence=42, deadline_s=2.0))
     assert (made.state.running.sequence, made.state.running.trigger_id) == (42, 7)
@@ -61,10 +61,10 @@ def test_an_outcome_in_the_stations_place_has_the_fruits_size(bench):
 def test_the_running_inspections_outcome_is_asked_for_again_after_a_lost_answer(bench):
     made = bench()
     made.run()
-    (asked,) = made.of(do.RequestOutcome)
+    (request,) = made.of(do.RequestOutcome)
     made.feed(ev.OutcomeFailed, 41, "no answer")
     made.link(Open(running=(41, 7), outcomes=()))
-    assert made.of(do.RequestOutcome) == [asked, asked]
+    assert made.of(do.RequestOutcome) == [request, request]
     assert made.state.inspection is Inspection.RUNNING
 
 
@@ -147,10 +147,10 @@ def test_a_request_that_fails_with_each_beat_is_logged_once(bench):
 def test_a_question_for_what_is_open_that_failed_is_put_again_at_the_next_beat(bench):
     made = bench()
     made.feed(ev.Beat, made.station_state())
-    asked = made.state.open_request
+    number = made.state.open_request
     made.feed(ev.RequestFailed, "it gave no answer")
     made.link()
-    assert [request.number for request in made.of(do.RequestOpen)] == [asked, asked + 1]
+    assert [request.number for request in made.of(do.RequestOpen)] == [number, number + 1]
     assert made.state.link is Link.UP
 
 

@@ -135,8 +135,12 @@ def test_an_unanswered_begin_is_refused_and_what_it_began_is_never_shown(bench):
     made.feed(ev.BeginAnswered, 1, BeginReply(sequence=41, deadline_s=1.0))
     assert made.state.running is None
     actions = made.link(Open(running=(41, 7), outcomes=()))
-    told, taken = [action for action in actions if not isinstance(action, do.SaveJournal | do.Log)]
-    assert (told.outcome.sequence, told.outcome.outcome, taken) == (41, "NO_RESULT", do.NotifyAcknowledged(41))
+    published, acknowledged = [action for action in actions if not isinstance(action, do.SaveJournal | do.Log)]
+    assert (published.outcome.sequence, published.outcome.outcome, acknowledged) == (
+        41,
+        "NO_RESULT",
+        do.NotifyAcknowledged(41),
+    )
     assert view(made.state)["result_sequence"] == 0
     assert made.state.journal.acknowledged == 41
 
@@ -147,13 +151,13 @@ def test_what_the_station_begins_after_its_trigger_was_refused_is_aborted(bench)
     made.write("enable", "trigger", trigger_id=7)
     made.feed(ev.BeginFailed, made.state.pending.number)
     made.link(packml_state=PackmlState.IDLE)
-    assert "acquiring" not in status(made), "it has not begun when it reports its state and what is open"
+    assert "acquiring" not in status(made), "it has not started when it reports its state and what is open"
     made.actions.clear()
     made.feed(ev.Beat, made.station_state(packml_state=PackmlState.EXECUTE))
     assert "acquiring" in status(made)
     made.feed(ev.Beat, made.station_state(packml_state=PackmlState.EXECUTE))
-    [asked] = made.of(do.RequestOpen)
-    made.feed(ev.OpenAnswered, asked.number, Open(running=(41, 7), outcomes=()))
+    [request] = made.of(do.RequestOpen)
+    made.feed(ev.OpenAnswered, request.number, Open(running=(41, 7), outcomes=()))
     assert [action.outcome.sequence for action in made.of(do.NotifyPublished)] == [41]
     assert (made.state.link, made.state.queue, made.state.journal.acknowledged) == (Link.UP, (), 41)
     made.feed(ev.Beat, made.station_state(packml_state=PackmlState.EXECUTE))
@@ -208,9 +212,9 @@ def test_what_was_open_before_an_acceptance_does_not_end_it(bench):
     made.write("enable", "trigger", trigger_id=7)
     made.feed(ev.RequestFailed, "a note was lost")
     made.feed(ev.Beat, made.station_state())
-    asked_before = made.state.open_request
+    request_before = made.state.open_request
     made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=41, deadline_s=1.0))
-    made.feed(ev.OpenAnswered, asked_before, Open(running=None, outcomes=()))
+    made.feed(ev.OpenAnswered, request_before, Open(running=None, outcomes=()))
     assert (made.state.inspection, made.state.link) == (Inspection.RUNNING, Link.RESUMING)
     made.link(Open(running=(41, 7), outcomes=()))
     assert (made.state.inspection, made.state.link) == (Inspection.RUNNING, Link.UP)
@@ -284,8 +288,8 @@ def test_what_stands_is_told_once_the_station_is_back_and_no_timer_is_left(bench
     made.now_s += 1.5
     made.feed(ev.Tick)
     assert Signal.RESULT_DEADLINE not in made.state.timers
-    told = made.link(Open(running=(41, 7), outcomes=()))
-    assert [action.outcome for action in told if isinstance(action, do.NotifyPublished)] == list(made.state.queue)
+    actions = made.link(Open(running=(41, 7), outcomes=()))
+    assert [action.outcome for action in actions if isinstance(action, do.NotifyPublished)] == list(made.state.queue)
 
 
 def test_with_its_journal_lost_the_interface_takes_over_what_the_station_holds(bench):
@@ -464,9 +468,9 @@ def test_what_the_plc_acknowledged_while_the_station_was_lost_is_told_also_while
     made.write("enable", acknowledged_sequence=41)
     made.actions.clear()
     made.link(Open(running=(41, 7), outcomes=()))
-    told = [action for action in made.actions if isinstance(action, do.NotifyPublished | do.NotifyAcknowledged)]
-    assert [type(action) for action in told] == [do.NotifyPublished, do.NotifyAcknowledged]
-    assert told[-1] == do.NotifyAcknowledged(41)
+    notes = [action for action in made.actions if isinstance(action, do.NotifyPublished | do.NotifyAcknowledged)]
+    assert [type(action) for action in notes] == [do.NotifyPublished, do.NotifyAcknowledged]
+    assert notes[-1] == do.NotifyAcknowledged(41)
 
 
 def test_an_outcome_acknowledged_before_the_station_noted_it_is_told_again_after_its_restart(bench):
@@ -478,8 +482,8 @@ def test_an_outcome_acknowledged_before_the_station_noted_it_is_told_again_after
     made.feed(ev.RequestFailed, "the note was lost")
     made.actions.clear()
     made.link(Open(running=None, outcomes=(made.outcome("NO_RESULT", Reason.STATION_LOST),)))
-    told = [action.outcome for action in made.actions if isinstance(action, do.NotifyPublished)]
-    assert told == [shown]
+    published = [action.outcome for action in made.actions if isinstance(action, do.NotifyPublished)]
+    assert published == [shown]
     made.feed(ev.OutcomeNoted, 41)
     assert made.state.journal.verdicts == ()
 
@@ -548,10 +552,10 @@ GATE_LOST = LineFault(part="can", what=verbatim("the gate is lost"))
 def test_the_station_is_told_of_the_line(bench):
     made = bench()
     made.armed()
-    told = line(made.state, {"count_bad_requests": 3}, (GATE_LOST,))
-    assert (told.plc_connected, told.plc_alive, told.enabled, told.waiting) == (True, False, True, 0)
-    assert told.counters["count_bad_requests"] == 3
-    assert told.faults == (GATE_LOST,)
+    state = line(made.state, {"count_bad_requests": 3}, (GATE_LOST,))
+    assert (state.plc_connected, state.plc_alive, state.enabled, state.waiting) == (True, False, True, 0)
+    assert state.counters["count_bad_requests"] == 3
+    assert state.faults == (GATE_LOST,)
 
 
 @pytest.mark.parametrize(("lost", "withdrawn"), [("heartbeat", True), ("writer", True), ("released", False)])
@@ -568,13 +572,13 @@ def test_the_station_misses_a_plc_that_goes_while_it_is_armed_and_no_other(bench
         made.feed(ev.WriterWithdrawn)
     made.now_s += made.settings.plc_heartbeat_timeout_s
     made.feed(ev.Tick)
-    told = line(made.state, {}, ())
-    assert (told.plc_alive, told.enabled, told.enable_withdrawn) == (False, False, withdrawn)
+    state = line(made.state, {}, ())
+    assert (state.plc_alive, state.enabled, state.enable_withdrawn) == (False, False, withdrawn)
     made.feed(ev.WriterGranted)
     made.write(plc_heartbeat=7)
     made.write("enable", plc_heartbeat=8)
-    told = line(made.state, {}, ())
-    assert (told.plc_alive, told.enabled, told.enable_withdrawn) == (True, True, False)
+    state = line(made.state, {}, ())
+    assert (state.plc_alive, state.enabled, state.enable_withdrawn) == (True, True, False)
 
 
 def test_a_plc_back_with_its_bit_high_after_the_answer_came_has_to_take_it_back(bench):

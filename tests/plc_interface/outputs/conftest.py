@@ -59,7 +59,7 @@ class Rig:
         await self.until(lambda: self.io.ready)
 
     async def order(self, sequence: int, ahead: int, lane: int = 1) -> asyncio.Task[Any]:
-        """Order a shot on a belt that stands still, and wait until the gate has it or refused it."""
+        """Order a shot on a belt that does not move, and wait until the gate has it or refused it."""
         self.faults.set(CommonFault.STUCK)
         at_count = (self.nodes.encoder.count + ahead) % 2**32
         await self.until(lambda: self.io.encoder_count() == self.nodes.encoder.count)

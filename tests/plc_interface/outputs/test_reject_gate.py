@@ -133,7 +133,7 @@ def test_an_outcome_that_comes_again_is_one_shot(gated):
 
 
 def test_a_shot_of_an_outcome_given_while_the_gate_is_away_is_fired_once_it_is_back(gated):
-    """As after a loss of the station: no heartbeat, the gate is safe, and NO_RESULT stands."""
+    """As after a loss of the station: no heartbeat, the gate is safe, and NO_RESULT remains."""
 
     async def scenario(rig):
         count = rig.gate.encoder_count()

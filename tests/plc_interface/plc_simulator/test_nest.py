@@ -1,4 +1,4 @@
-"""The simulated grader: what the PLC is told of the length of the fruit that the twin lays."""
+"""The simulated grader: what the PLC receives of the length of the fruit that the twin lays."""
 
 import asyncio
 
@@ -16,12 +16,12 @@ RECIPES = {"strawberry": 1, "blueberry": 2}
 
 def test_a_grader_errs_evenly_within_its_bounds_in_tenths():
     grader, again = Grader(7), Grader(7)
-    told = [grader.length_mm_x10(45.44) for _ in range(2_000)]
-    assert told == [again.length_mm_x10(45.44) for _ in range(2_000)]
-    assert set(told) == set(range(444, 465)), "every tenth within ± 1 mm, and none beyond"
+    lengths = [grader.length_mm_x10(45.44) for _ in range(2_000)]
+    assert lengths == [again.length_mm_x10(45.44) for _ in range(2_000)]
+    assert set(lengths) == set(range(444, 465)), "every tenth within ± 1 mm, and none beyond"
     assert GRADER_ERROR_MM == 1.0
-    outer = sum(abs(length - 454.4) > 5 for length in told)
-    assert 0.45 < outer / len(told) < 0.55, "half of them in the outer halves"
+    outer = sum(abs(length - 454.4) > 5 for length in lengths)
+    assert 0.45 < outer / len(lengths) < 0.55, "half of them in the outer halves"
 
 
 @pytest.mark.parametrize("graded", [True, False])

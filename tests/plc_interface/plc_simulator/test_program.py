@@ -20,7 +20,7 @@ SCAN_S = 0.1
 
 
 class Station:
-    """Answers as the interface does, one scan behind, and does wrong what a test asks for."""
+    """Answers as the interface does, one scan behind, and makes the mistake that a test sets."""
 
     def __init__(self, outcome="PASS"):
         self.outcome, self.next_sequence, self.heartbeat = outcome, 40, 0

@@ -1,4 +1,4 @@
-"""The scan loop's own part: an end that is asked for is not lost, and a lost connection is made anew."""
+"""The scan loop's own part: a requested end is not lost, and a lost connection is made anew."""
 
 import asyncio
 import contextlib

@@ -13,7 +13,7 @@ PATIENCE_S = 30
 
 
 class HandNest:
-    """A fruit lies there as soon as one is asked for."""
+    """A fruit is there as soon as one is requested."""
 
     def __init__(self):
         self.arrived = self.left = 0

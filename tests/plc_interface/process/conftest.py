@@ -48,7 +48,7 @@ class Plc:
         assert exception == 0, f"exception {exception} for {values}"
 
     async def try_write(self, **values: int | str) -> int:
-        """The exception code, 0 for none. What lies apart from the control bits goes before them."""
+        """The exception code, 0 for none. Fields apart from the control bits go before them."""
         runs: list[tuple[int, list[int]]] = []
         for register in sorted((BY_NAME[name] for name in values), key=lambda register: register.address):
             words = list(encode(register, values[register.name], self._order))
@@ -163,9 +163,9 @@ class Cell:
         other = await asyncio.create_subprocess_exec(
             *COMMAND, env=self._environment, stderr=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE
         )
-        _, said = await asyncio.wait_for(other.communicate(), PATIENCE_S)
+        _, errors = await asyncio.wait_for(other.communicate(), PATIENCE_S)
         assert other.returncode is not None
-        return other.returncode, said.decode()
+        return other.returncode, errors.decode()
 
     async def end(self, number: signal.Signals = signal.SIGTERM) -> int:
         """Signal the interface and give its exit code."""

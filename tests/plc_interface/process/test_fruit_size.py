@@ -20,14 +20,14 @@ def test_wrong_and_stale_sizes_reach_the_station_and_the_result_as_they_were_giv
                 if size:
                     await plc.write(**size)
                 await plc.trigger(number)
-                begun = station.begun[station.running]
+                request = station.accepted[station.running]
                 station.finish("PASS")
                 shown = await plc.wait("result_valid", result_trigger_id=number)
                 assert shown["result_sequence"] == shown["result_sequence_end"]
                 await plc.write(acknowledged_sequence=shown["result_sequence"])
                 await plc.wait(without="result_valid", result_fruit_length_mm_x10=0, result_size_class=0)
                 echo = (shown["result_fruit_length_mm_x10"], shown["result_size_class"])
-                assert echo == (begun.fruit_length_mm_x10, begun.size_class)
+                assert echo == (request.fruit_length_mm_x10, request.size_class)
                 return echo
 
             assert await inspected(1) == NONE
@@ -58,15 +58,15 @@ def test_a_program_that_knows_no_size_reads_and_writes_as_before(cell):
             block[BY_NAME["trigger_id"].address], block[BY_NAME["write_key"].address] = 9, 0x5AFE
             assert not (await plc._client.write_registers(0, block)).isError()
             await plc.wait("inspecting")
-            begun = made.station.begun[made.station.running]
+            request = made.station.accepted[made.station.running]
             made.station.finish("PASS")
             await plc.wait("result_valid", result_trigger_id=9)
             answer = await plc._client.read_holding_registers(GROUP_BY_NAME["status"].address, count=old_read)
-            return begun, old_words, old_read, answer
+            return request, old_words, old_read, answer
 
-    begun, words, count, answer = asyncio.run(scenario())
+    request, words, count, answer = asyncio.run(scenario())
     assert (words, count, len(answer.registers)) == (27, 58, 58)
-    assert (begun.trigger_id, begun.fruit_length_mm_x10, begun.size_class) == (9, 0, 0)
+    assert (request.trigger_id, request.fruit_length_mm_x10, request.size_class) == (9, 0, 0)
 
 
 @pytest.mark.parametrize("lost", ["station", "interface"])

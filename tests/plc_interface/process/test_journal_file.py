@@ -17,11 +17,11 @@ from station.messages import line as messages
 def test_what_was_written_is_read(tmp_path):
     file = JournalFile(tmp_path / "plc")
     assert file.read() == Journal()
-    kept = Journal(boots=3, highest=9, hidden=(8,), command_sequence=1)
-    file.write(kept, durable=True)
-    assert file.read() == kept
+    journal = Journal(boots=3, highest=9, hidden=(8,), command_sequence=1)
+    file.write(journal, durable=True)
+    assert file.read() == journal
     written = json.loads((tmp_path / "plc" / "journal.json").read_text(encoding="utf-8"))
-    assert written == {"boots": 3, "highest": 9, "hidden": [8], "command_sequence": 1}, "no field that says nothing"
+    assert written == {"boots": 3, "highest": 9, "hidden": [8], "command_sequence": 1}, "no field that is empty"
     file.close()
 
 

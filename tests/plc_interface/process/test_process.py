@@ -69,12 +69,12 @@ def test_every_refusal_is_told_with_its_reason_and_counted(cell, limit_s):
         limits = {"handshake_begin_deadline_s": limit_s, "handshake_station_lost_after_s": limit_s}
         async with cell(**limits) as made:
             station, plc = made.station, await made.plc()
-            told: list[tuple[str, int]] = []
+            refusals: list[tuple[str, int]] = []
 
             async def refused(trigger_id: int) -> None:
                 seen = await plc.trigger(trigger_id)
                 assert "missed" in seen["status"]
-                told.append((seen["last_refusal"], seen["last_refused_trigger_id"]))
+                refusals.append((seen["last_refusal"], seen["last_refused_trigger_id"]))
 
             await plc.wait("online")
             await refused(1)
@@ -111,7 +111,7 @@ def test_every_refusal_is_told_with_its_reason_and_counted(cell, limit_s):
             await station.die()
             await plc.wait(without="online")
             await refused(9)
-            assert told == [
+            assert refusals == [
                 ("not_enabled", 1),
                 ("bad_trigger_id", 0),
                 ("offline", 2),
@@ -157,7 +157,7 @@ def test_a_lot_with_a_barcode_readers_cr_fails_its_latch_and_nothing_else(cell, 
 
 
 def test_no_fruit_is_begun_while_the_reject_gate_cannot_divert_it(cell, until):
-    """An interface that this machine does not have: told to the station, and every trigger is refused."""
+    """An interface that this machine does not have: reported to the station, and every trigger is refused."""
 
     async def scenario():
         async with cell(can_enabled=True, can_interface="socketcan", can_channel="nocan7") as made:
@@ -171,7 +171,7 @@ def test_no_fruit_is_begun_while_the_reject_gate_cannot_divert_it(cell, until):
             assert fault.what.id == can.NOT_OPENED.id
             seen = await plc.trigger(1)
             assert (seen["last_refusal"], "trigger_ready" in seen["status"]) == ("not_ready", False)
-            assert station.begun == {}
+            assert station.accepted == {}
 
     asyncio.run(scenario())
 
@@ -382,7 +382,7 @@ def test_an_interface_that_is_killed_continues_where_it_was(cell, until):
             await made.start()
             plc = await made.plc()
             seen = await plc.wait("online", "inspecting", without="trigger_ready")
-            assert (seen["waiting_results"], seen["result_sequence"]) == (1, 0), "until the PLC says what it has taken"
+            assert (seen["waiting_results"], seen["result_sequence"]) == (1, 0), "until the PLC writes what it took"
             await plc.write(acknowledged_sequence=101)
             seen = await plc.wait("online", "result_valid", "inspecting", without="trigger_ready")
             assert (seen["result_sequence"], seen["result_trigger_id"], seen["result_outcome"]) == (102, 2, "PASS")
@@ -447,10 +447,10 @@ def test_the_end_is_orderly_and_a_second_interface_is_one_sentence(cell):
         async with cell() as made:
             plc = await made.plc()
             await plc.arm()
-            code, said = await made.start_another()
+            code, message = await made.start_another()
             where = made.home / "plc"
             assert code == 2
-            assert said == (
+            assert message == (
                 f"station: another PLC interface runs in {where}: stop it, or give this one a home folder of its own\n"
             )
             ending = asyncio.create_task(made.end())

@@ -25,7 +25,7 @@ def test_a_note_that_is_refused_is_repeated_until_the_station_takes_it(refusals,
 
     async def main(home: str):
         station = ScriptedStation(f"ipc://{home}/line.ipc")
-        station.begun[101], station.running = Begin(trigger_id=4711, encoder=0, lot=""), 101
+        station.accepted[101], station.running = Begin(trigger_id=4711, encoder=0, lot=""), 101
         outcome = station.finish("NO_RESULT", Reason.LATE)
         station.spoilt_notes = refusals
         settings = HandshakeSettings(station_lost_after_s=30.0)
@@ -50,26 +50,26 @@ def test_a_note_on_an_inspection_that_the_station_never_began_is_not_repeated(mo
     """An earlier home was put back: its number may soon be another fruit's."""
     monkeypatch.setattr(station_link, "_NOTE_AGAIN_S", 0.01)
     monkeypatch.setattr(station_link, "_NOTE_LATER_S", 0.01)
-    asked: list[int] = []
+    sequences: list[int] = []
 
     async def refuse(request: Published) -> Noted:
-        asked.append(request.outcome.sequence)
+        sequences.append(request.outcome.sequence)
         raise UnknownInspectionError(messages.NEVER_BEGUN(number=request.outcome.sequence), messages.ASK_OPEN())
 
     async def main(home: str):
         station = ScriptedStation(f"ipc://{home}/line.ipc")
-        station.begun[101], station.running = Begin(trigger_id=4711, encoder=0, lot=""), 101
+        station.accepted[101], station.running = Begin(trigger_id=4711, encoder=0, lot=""), 101
         outcome = station.finish("NO_RESULT", Reason.LATE)
         monkeypatch.setattr(station, "_published", refuse)
         settings = HandshakeSettings(station_lost_after_s=30.0)
         link = StationLink(station.endpoint, settings, lambda _: None, lambda: pytest.fail("no beat was started"))
         await station.start()
         link.carry_out(do.NotifyPublished(outcome))
-        await until(lambda: asked and not link._notes)
+        await until(lambda: sequences and not link._notes)
         await until(lambda: link._repeating is not None and link._repeating.done())
         await link.stop()
         await station.die()
 
     with tempfile.TemporaryDirectory() as home:
         asyncio.run(main(home))
-    assert asked == [101] * 3
+    assert sequences == [101] * 3

@@ -49,7 +49,7 @@ async def run_of_interface(folder, endpoint):
 def station(short_folder):
     """With a FAIL that ended the inspection."""
     made = ScriptedStation(f"ipc://{short_folder}/line.ipc")
-    made.begun[SEQUENCE] = Begin(trigger_id=7, encoder=ENCODER, lot="")
+    made.accepted[SEQUENCE] = Begin(trigger_id=7, encoder=ENCODER, lot="")
     made.running = SEQUENCE
     made.finish("FAIL", Reason.AREA_OVER_LIMIT)
     return made

@@ -98,7 +98,7 @@ def test_what_has_no_invalid_value_takes_none_of_it():
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "says"),
+    ("name", "value", "message"),
     [
         ("trigger_id", 65_536, "u16 and cannot hold 65536"),
         ("trigger_id", -1, "cannot hold -1"),
@@ -111,8 +111,8 @@ def test_what_has_no_invalid_value_takes_none_of_it():
         ("lot", 7, "printable ASCII"),
     ],
 )
-def test_what_does_not_fit_is_refused_in_words(name, value, says):
-    with pytest.raises(RegisterValueError, match=says):
+def test_what_does_not_fit_is_refused_in_words(name, value, message):
+    with pytest.raises(RegisterValueError, match=message):
         encode(BY_NAME[name], value)
 
 
@@ -133,7 +133,7 @@ def test_a_text_ends_at_its_first_nul_and_may_be_filled_up_with_spaces():
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "says"),
+    ("name", "value", "message"),
     [
         ("command_code", 6, "knows no value 6; there are: 0 none, 1 change_recipe"),
         ("write_key", 1, "knows no value 1"),
@@ -142,8 +142,8 @@ def test_a_text_ends_at_its_first_nul_and_may_be_filled_up_with_spaces():
         ("result_area_mm2_x100", -1, "from 0 to 2.14748e+09, not -1"),
     ],
 )
-def test_a_value_without_a_meaning_is_told(name, value, says):
-    assert says in problem(BY_NAME[name], value)
+def test_a_value_without_a_meaning_is_told(name, value, message):
+    assert message in problem(BY_NAME[name], value)
 
 
 @pytest.mark.parametrize(

@@ -121,10 +121,10 @@ def test_a_program_made_from_it_inspects_a_fruit_and_reads_what_the_registers_ha
                 seen = await program.until("result_valid")
             finally:
                 client.close()
-            return seen, {row["name"]: rig.image.value(row["name"]) for row in rows}, rig.begun
+            return seen, {row["name"]: rig.image.value(row["name"]) for row in rows}, rig.accepted
 
-    seen, there, begun = asyncio.run(main())
-    assert [trigger_id for trigger_id, _, _ in begun] == [7]
+    seen, there, accepted = asyncio.run(main())
+    assert [trigger_id for trigger_id, _, _ in accepted] == [7]
     changing = {"station_heartbeat"}
     assert {name: value for name, value in seen.items() if name not in changing} == {
         name: pytest.approx(value, rel=1e-6) if isinstance(value, float) else value

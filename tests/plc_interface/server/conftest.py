@@ -1,4 +1,4 @@
-"""A server on the wire, and a client that says exactly the bytes it is told to."""
+"""A server on the wire, and a client that sends exactly the given bytes."""
 
 import asyncio
 import contextlib
@@ -66,7 +66,7 @@ class Serving:
         return result.result(DEADLINE_S)
 
     def wait(self, condition: Callable[[], Any]) -> Any:
-        """The condition's value once it is true, looked at on the loop."""
+        """The condition's value once it is true, checked on the loop."""
         return wait_for(lambda: self.call(condition))
 
     async def _start(self) -> None:
@@ -108,15 +108,15 @@ class Wire:
         assert protocol == 0
         return transaction, unit, self._exactly(length - 1)
 
-    def ask(self, message: bytes, unit: int = 1) -> bytes:
-        """The answer to one request."""
+    def exchange(self, message: bytes, unit: int = 1) -> bytes:
+        """Send one request and return its response."""
         self.send(self.request(message, unit))
         transaction, answering_unit, answer = self.receive()
         assert (transaction, answering_unit) == (self.transaction, unit)
         return answer
 
     def read(self, address: int, count: int, function: int = 3) -> bytes:
-        answer = self.ask(struct.pack(">BHH", function, address, count))
+        answer = self.exchange(struct.pack(">BHH", function, address, count))
         assert answer[0] == function, answer.hex()
         assert answer[1] == len(answer) - 2
         return answer[2:]
@@ -124,7 +124,7 @@ class Wire:
     def write(self, address: int, *words: int) -> bytes:
         """The answer to function code 16."""
         count = len(words)
-        return self.ask(struct.pack(f">BHHB{count}H", 16, address, count, 2 * count, *words))
+        return self.exchange(struct.pack(f">BHHB{count}H", 16, address, count, 2 * count, *words))
 
     def claim(self) -> None:
         """Set the write key, and so become the writer."""

@@ -16,7 +16,7 @@ from tests.tools import missing, optional, required
 
 CLIENTS = Path(__file__).parent / "clients"
 FETCHED = Path(tempfile.gettempdir()) / f"fruit-station-clients-{os.getuid()}"
-"""Packages from npm, Go's proxy and Maven, kept from one run to the next."""
+"""Packages from npm, Go's proxy and Maven, cached from one run to the next."""
 FETCH_S, RUN_S = 60, 60
 
 
@@ -39,7 +39,7 @@ def fetched(what: str, *command: object, cwd: Path) -> None:
 
 
 def saw(serving, trigger_id: int) -> None:
-    """The server was told what the client wrote, and of its coming and going."""
+    """The server received what the client wrote, and noticed its coming and going."""
     serving.wait(lambda: serving.server.writer is None)
     assert {"control": 1, "trigger_id": trigger_id} in serving.writes
     assert [change for _, change in serving.changes] == [WriterChange.CLAIMED, WriterChange.DISCONNECTED]
@@ -104,8 +104,8 @@ def test_modbus_serial_with_parallel_requests(serve):
     folder = FETCHED / "npm"
     folder.mkdir(parents=True, exist_ok=True)
     if not (folder / "node_modules" / "modbus-serial").exists():
-        quiet = ("--silent", "--no-audit", "--no-fund", "--ignore-scripts")
-        fetched("modbus-serial", npm, "install", *quiet, "--prefix", folder, "modbus-serial@8", cwd=folder)
+        options = ("--silent", "--no-audit", "--no-fund", "--ignore-scripts")
+        fetched("modbus-serial", npm, "install", *options, "--prefix", folder, "modbus-serial@8", cwd=folder)
     shutil.copy(CLIENTS / "parallel.js", folder)
     serving = serve()
     done = run(node, folder / "parallel.js", "127.0.0.1", serving.settings.port)
@@ -132,8 +132,8 @@ def test_j2mod(serve):
     folder = FETCHED / "java"
     folder.mkdir(parents=True, exist_ok=True)
     if not list(folder.glob("j2mod-*.jar")):
-        quiet = ("-q", "-B", f"-DoutputDirectory={folder}")
-        fetched("j2mod", mvn, *quiet, "-f", CLIENTS / "pom.xml", "dependency:copy-dependencies", cwd=folder)
+        options = ("-q", "-B", f"-DoutputDirectory={folder}")
+        fetched("j2mod", mvn, *options, "-f", CLIENTS / "pom.xml", "dependency:copy-dependencies", cwd=folder)
     serving = serve()
     done = run(java, "-cp", f"{folder}/*", CLIENTS / "Client.java", "127.0.0.1", serving.settings.port)
     assert not done.returncode, done.stderr

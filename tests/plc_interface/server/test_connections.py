@@ -33,7 +33,7 @@ class TestLimit:
         crowd(serving.settings.port, 40, "127.0.0.9")
         serving.wait(lambda: serving.server.statistics.troubles[Trouble.TOO_MANY] >= 35)
         others = [connect(serving, f"127.0.1.{number}") for number in range(27)]
-        assert all(other.ask(READ) == GOOD for other in others)
+        assert all(other.exchange(READ) == GOOD for other in others)
         assert serving.call(lambda: serving.server.connections) == 32
         assert connect(serving, "127.0.2.1").is_closed()
 
@@ -75,11 +75,11 @@ class TestLimit:
     def test_a_place_is_free_again_behind_a_client_that_left(self, serve, connect):
         serving = serve(max_connections=1, writers=())
         first = connect(serving)
-        assert first.ask(READ) == GOOD
+        assert first.exchange(READ) == GOOD
         assert connect(serving).is_closed()
         first.close()
         serving.wait(lambda: serving.server.connections == 0)
-        assert connect(serving).ask(READ) == GOOD
+        assert connect(serving).exchange(READ) == GOOD
 
     def test_a_storm_of_resets(self, serve, connect):
         serving = serve()
@@ -92,7 +92,7 @@ class TestLimit:
             if number % 30 == 0:
                 assert plc.write(TRIGGER_ID, number)[0] == 16
         serving.wait(lambda: serving.server.connections == 1)
-        assert plc.ask(READ) == GOOD
+        assert plc.exchange(READ) == GOOD
         assert serving.server.writer is not None
 
 
@@ -109,7 +109,7 @@ class TestTime:
             for wire in slow:
                 with contextlib.suppress(OSError):
                     wire.send(b"\0")
-            assert plc.ask(READ) == GOOD
+            assert plc.exchange(READ) == GOOD
             return serving.server.statistics.troubles[Trouble.UNFINISHED] == 8
 
         eventually(drip)
@@ -119,14 +119,14 @@ class TestTime:
     def test_half_a_request_at_the_end_of_a_segment_has_its_own_time(self, serve, connect, eventually):
         serving = serve(frame_timeout_s=2.0)
         wire = connect(serving)
-        begun = wire.request(READ)
-        wire.send(begun[:5])
+        unfinished = wire.request(READ)
+        wire.send(unfinished[:5])
 
         def go_on():
-            nonlocal begun
+            nonlocal unfinished
             following = wire.request(READ)
-            wire.send(begun[5:] + following[:5])
-            begun = following
+            wire.send(unfinished[5:] + following[:5])
+            unfinished = following
             assert wire.receive() == (wire.transaction - 1, 1, GOOD)
             return serving.server.statistics.requests > 120
 
@@ -136,9 +136,9 @@ class TestTime:
     def test_the_idle_are_parted_from(self, serve, connect, eventually):
         serving = serve(idle_timeout_s=2.0)
         idle, plc = connect(serving, "127.0.0.9"), connect(serving)
-        eventually(lambda: plc.ask(READ) == GOOD and serving.server.statistics.troubles[Trouble.IDLE])
+        eventually(lambda: plc.exchange(READ) == GOOD and serving.server.statistics.troubles[Trouble.IDLE])
         assert idle.is_closed()
-        assert plc.ask(READ) == GOOD
+        assert plc.exchange(READ) == GOOD
 
     def test_a_client_that_does_not_take_its_responses(self, serve, connect, eventually):
         serving = serve(frame_timeout_s=0.5)
@@ -155,7 +155,7 @@ class TestTime:
             nonlocal sent
             with contextlib.suppress(OSError):
                 sent += deaf.socket.send((request * 1000)[sent % len(request) :])
-            assert plc.ask(READ) == GOOD
+            assert plc.exchange(READ) == GOOD
             return serving.server.statistics.troubles[Trouble.SLOW_READER]
 
         eventually(shout)
@@ -170,7 +170,7 @@ class TestTime:
         began_s = time.monotonic()
         loud.send(loud.request(READ) * count)
         for _ in range(10):
-            assert plc.ask(READ) == GOOD
+            assert plc.exchange(READ) == GOOD
         assert [loud.receive()[2] for _ in range(count)] == [GOOD] * count
         assert time.monotonic() - began_s > 3.0, (
             "of four seconds at this rate, but for what is read and permitted at once"

@@ -97,7 +97,7 @@ def test_a_dissector_finds_nothing_malformed_in_any_answer(serve, connect, tshar
 
 
 def test_the_dissector_would_find_it(serve, connect, tshark, tmp_path):
-    """An answer whose last object says more bytes than there are, in a frame whose length agrees with what is there."""
+    """An answer whose last object's length is too large, in a frame whose length agrees with what is there."""
     [(request, answer)] = talk(connect(serve()), [bytes.fromhex("2b 0e 01 00")])
     file = tmp_path / "talk.pcap"
     capture(file, [(request, answer[:4] + (len(answer) - 8).to_bytes(2) + answer[6:-2])])

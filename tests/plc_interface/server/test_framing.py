@@ -32,7 +32,7 @@ def test_frames_come_out_as_they_went_in_and_what_is_cut_off_waits(messages, dat
 def test_any_bytes_are_frames_or_malformed_or_unfinished(data):
     used = 0
     try:
-        for (_, _, message), used in frames(data, len(data)):  # noqa: B007 (looked at behind the loop)
+        for (_, _, message), used in frames(data, len(data)):  # noqa: B007 (used behind the loop)
             assert 1 <= len(message) <= LONGEST_MESSAGE
     except MalformedFrameError:
         protocol, length = struct.unpack_from(">HH", data, used + 2)

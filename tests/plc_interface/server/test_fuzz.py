@@ -61,7 +61,7 @@ class Capture:
 
 
 class GoodClient(threading.Thread):
-    """Asks the same question over and over, and wants the right answer each time."""
+    """Sends the same request over and over, and checks for the right answer each time."""
 
     def __init__(self, wire) -> None:
         super().__init__(name="good client", daemon=True)
@@ -72,7 +72,7 @@ class GoodClient(threading.Thread):
     def run(self) -> None:
         try:
             while not self.enough.is_set():
-                assert self.wire.ask(GOOD) == GOOD_ANSWER
+                assert self.wire.exchange(GOOD) == GOOD_ANSWER
                 self.answers += 1
         except (AssertionError, OSError) as error:
             self.wrong = error
@@ -148,7 +148,7 @@ def test_tshark_finds_nothing_malformed_in_the_answers(serving, connect, tmp_pat
         bytes([43, 14, 2, 0]),
     ]
     for message in good:
-        answer = wire.ask(message)
+        answer = wire.exchange(message)
         assert answer[0] == message[0]
         capture.add(struct.pack(">HHHB", wire.transaction, 0, len(answer) + 1, 1) + answer)
     assert len(capture.judged(tmp_path / "good.pcap", "modbus")) == capture.frames

@@ -51,14 +51,14 @@ class TestReading:
     def test_every_register_can_be_read_by_itself_and_no_other(self, plc):
         mapped = {address for register in REGISTERS for address in range(register.address, register.end)}
         for address in range(LAST + 2):
-            answer = plc.ask(struct.pack(">BHH", 3, address, 1))
+            answer = plc.exchange(struct.pack(">BHH", 3, address, 1))
             assert answer[:1] == (b"\x03" if address in mapped else b"\x83"), address
 
     def test_identification(self, plc):
-        answer = plc.ask(bytes([43, 14, 1, 0]))
+        answer = plc.exchange(bytes([43, 14, 1, 0]))
         assert answer[:8] == bytes([43, 14, 1, 0x82, 0, 0, 3, 0])
         assert b"fruit-station" in answer
-        assert plc.ask(bytes([43, 14, 4, 4]))[6:8] == bytes([1, 4])
+        assert plc.exchange(bytes([43, 14, 4, 4]))[6:8] == bytes([1, 4])
 
 
 class TestWriting:
@@ -69,27 +69,27 @@ class TestWriting:
 
     def test_one_register(self, serving, plc):
         request = struct.pack(">BHH", 6, TRIGGER_ID, 9)
-        assert plc.ask(request) == request
+        assert plc.exchange(request) == request
         assert serving.writes == [{"trigger_id": 9}]
 
     def test_coils_leave_the_other_flags_alone(self, serving, plc):
         plc.write(CONTROL, 0b101)
         request = struct.pack(">BHH", 5, bit_address(BY_NAME["control"], 1), 0xFF00)
-        assert plc.ask(request) == request
+        assert plc.exchange(request) == request
         assert serving.image.value("control") == 0b111
         request = struct.pack(">BHHBB", 15, bit_address(BY_NAME["control"], 0), 2, 1, 0b1111_1100)
-        assert plc.ask(request) == request[:5]
+        assert plc.exchange(request) == request[:5]
         assert serving.image.value("control") == 0b100
 
     def test_mask(self, serving, plc):
         plc.write(CONTROL, 0b101)
         request = struct.pack(">BHHH", 22, CONTROL, 0b100, 0b010)
-        assert plc.ask(request) == request
+        assert plc.exchange(request) == request
         assert serving.image.value("control") == 0b110
 
     def test_a_scan_in_one_round_trip(self, serving, plc):
         request = struct.pack(">BHHHHBHH", 23, TRIGGER_ID, 1, CONTROL, 2, 4, 1, 4711)
-        assert plc.ask(request) == struct.pack(">BBH", 23, 2, 4711)
+        assert plc.exchange(request) == struct.pack(">BBH", 23, 2, 4711)
         assert serving.writes == [{"control": 1, "trigger_id": 4711}]
 
     def test_text(self, serving, plc):
@@ -160,7 +160,7 @@ HEADINGS = {1: Trouble.ILLEGAL_FUNCTION, 2: Trouble.ILLEGAL_ADDRESS, 3: Trouble.
 
 @pytest.mark.parametrize("unit", [0, 255])
 def test_a_client_may_mean_the_server_itself(plc, unit):
-    assert plc.ask(struct.pack(">BHH", 3, BY_NAME["reference_u16"].address, 1), unit) == b"\x03\x02\x12\x34"
+    assert plc.exchange(struct.pack(">BHH", 3, BY_NAME["reference_u16"].address, 1), unit) == b"\x03\x02\x12\x34"
 
 
 class TestBadRequests:
@@ -169,7 +169,7 @@ class TestBadRequests:
         troubles, before = serving.server.statistics.troubles, serving.call(serving.image.registers, 0, BLOCK_END)
         heading = heading or HEADINGS[code]
         count, lines = troubles[heading], len(caplog.records)
-        assert plc.ask(request, unit) == bytes([request[0] | 0x80, code])
+        assert plc.exchange(request, unit) == bytes([request[0] | 0x80, code])
         assert troubles[heading] == count + 1
         written = caplog.records[lines:]
         assert len(written) == 1

@@ -18,9 +18,9 @@ def test_a_port_in_use(serve, unused_port):
     with socket.socket() as other:
         other.bind(("127.0.0.1", unused_port))
         other.listen()
-        said = sentence(serve, port=unused_port)
-    assert said.startswith(f"Modbus TCP cannot be served on 127.0.0.1, port {unused_port}: another program listens")
-    assert "modbus.port" in said
+        text = sentence(serve, port=unused_port)
+    assert text.startswith(f"Modbus TCP cannot be served on 127.0.0.1, port {unused_port}: another program listens")
+    assert "modbus.port" in text
 
 
 def test_an_address_of_another_machine(serve):
@@ -34,9 +34,9 @@ def test_a_host_that_nobody_knows(serve):
 
 
 def test_a_low_port_without_the_right():
-    said = why_not("modbus", "10.0.0.1", 502, PermissionError(13, "Permission denied"))
-    assert said.startswith("Modbus TCP cannot be served on 10.0.0.1, port 502: ports below 1024 need a right")
-    assert "CAP_NET_BIND_SERVICE" in said
+    text = why_not("modbus", "10.0.0.1", 502, PermissionError(13, "Permission denied"))
+    assert text.startswith("Modbus TCP cannot be served on 10.0.0.1, port 502: ports below 1024 need a right")
+    assert "CAP_NET_BIND_SERVICE" in text
     assert issubclass(ModbusServerError, StationError)
 
 

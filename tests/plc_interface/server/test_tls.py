@@ -355,9 +355,9 @@ class TestBadFiles:
     def test_no_pem(self, refusal, tmp_path, name):
         wrong = tmp_path / "wrong.pem"
         wrong.write_text("nothing of the kind")
-        said = refusal(**{name: wrong})
-        assert said.startswith(f"modbus.tls.{name}: {wrong} ")
-        assert "give the PEM file" in said
+        text = refusal(**{name: wrong})
+        assert text.startswith(f"modbus.tls.{name}: {wrong} ")
+        assert "give the PEM file" in text
 
     def test_a_key_of_another_certificate(self, refusal, authority):
         _, key = authority.issue("other")

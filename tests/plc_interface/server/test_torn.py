@@ -13,7 +13,7 @@ AREA = BY_NAME["result_area_mm2"].address - BLOCK
 
 
 def result(sequence):
-    """A result in which every value tells its sequence."""
+    """A result in which every value follows from its sequence."""
     return {
         "result_sequence": sequence,
         "result_trigger_id": sequence % 65_536,

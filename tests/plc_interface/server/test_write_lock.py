@@ -140,5 +140,5 @@ class TestOnTheWire:
 
     def test_an_invalid_write_takes_nothing(self, serve, connect):
         serving = serve()
-        assert connect(serving).ask(struct.pack(">BHH", 6, KEY, 1)) == bytes([0x86, 3])
+        assert connect(serving).exchange(struct.pack(">BHH", 6, KEY, 1)) == bytes([0x86, 3])
         assert serving.server.writer is None

@@ -1,4 +1,4 @@
-"""An audit trail in a folder of the test's own, and the command line that looks at it."""
+"""An audit trail in a folder of the test's own, and the command line that reads it."""
 
 import sqlite3
 from collections.abc import Callable
@@ -32,7 +32,7 @@ def trail(folder: Path) -> Callable[..., None]:
 
 @pytest.fixture
 def station(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str]]:
-    """Call the command line: its exit code, and what it said."""
+    """Run the command line; return its exit code and its output."""
     monkeypatch.setenv("STATION_HOME", str(tmp_path / "home"))
     return call
 

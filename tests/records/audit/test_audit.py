@@ -1,4 +1,4 @@
-"""The audit trail: it only grows, and whatever was done to it behind its back is found."""
+"""The audit trail: it only grows, and every change behind its back is found."""
 
 import asyncio
 import errno
@@ -22,16 +22,16 @@ from tests.records.causes import because
 
 def test_a_whole_trail_is_whole_and_can_be_read(trail, station):
     trail(5, reason="because", old={"limit": 112.0}, new={"limit": 118.5})
-    code, told = station("audit", "verify")
+    code, output = station("audit", "verify")
     assert code == 0
-    assert told.startswith("OK 5 rows, the last one is 5:")
-    code, told = station("audit", "show", "--last", "2", "--action", "test")
+    assert output.startswith("OK 5 rows, the last one is 5:")
+    code, output = station("audit", "show", "--last", "2", "--action", "test")
     assert code == 0
-    assert "thing 3" in told
-    assert "thing 2" not in told
-    assert "by Ida (quality)" in told
-    assert "because" in told
-    assert "old: limit 112.0" in told
+    assert "thing 3" in output
+    assert "thing 2" not in output
+    assert "by Ida (quality)" in output
+    assert "because" in output
+    assert "old: limit 112.0" in output
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_the_database_itself_refuses_to_change_a_row(trail, folder, station, sta
 
 
 @pytest.mark.parametrize(
-    ("statement", "told"),
+    ("statement", "message"),
     [
         ("UPDATE audit SET who = 'Eve' WHERE seq = 3", "BROKEN row 3: it was changed"),
         ("UPDATE audit SET new = '1' WHERE seq = 2", "BROKEN row 2: it was changed"),
@@ -63,12 +63,12 @@ def test_the_database_itself_refuses_to_change_a_row(trail, folder, station, sta
         ("DELETE FROM audit", "BROKEN row 5: it is missing, and the head kept beside"),
     ],
 )
-def test_the_first_broken_row_is_named(trail, station, meddle, statement, told):
+def test_the_first_broken_row_is_named(trail, station, meddle, statement, message):
     trail(5)
     meddle(statement)
-    code, said = station("audit", "verify")
+    code, output = station("audit", "verify")
     assert code == 1
-    assert said.startswith(told)
+    assert output.startswith(message)
 
 
 def test_a_row_forged_with_its_hash_is_found_by_the_next(trail, folder, station, meddle):
@@ -77,9 +77,9 @@ def test_a_row_forged_with_its_hash_is_found_by_the_next(trail, folder, station,
         row = AuditRow(*connection.exec_driver_sql("SELECT * FROM audit WHERE seq = 2").one())
     forged = AuditRow(*row_values(row, who="Eve"))
     meddle(f"UPDATE audit SET who = 'Eve', hash = '{forged.true_hash}' WHERE seq = 2")
-    code, told = station("audit", "verify")
+    code, output = station("audit", "verify")
     assert code == 1
-    assert told.startswith("BROKEN row 3: it was not written behind row 2 as that is now")
+    assert output.startswith("BROKEN row 3: it was not written behind row 2 as that is now")
 
 
 def row_values(row, **changed):
@@ -91,35 +91,35 @@ def test_rows_cut_off_are_told_by_the_next_start_too_and_by_an_anchor(trail, fol
     anchor = station("audit", "verify")[1].split()[-1]
     meddle("DELETE FROM audit WHERE seq > 3")
     (folder / "audit_head").unlink()
-    code, told = station("audit", "verify", "--anchor", anchor)
+    code, output = station("audit", "verify", "--anchor", anchor)
     assert code == 1
-    assert "row 5: it is missing, and the anchor names it" in told
-    assert "the head kept beside the database is missing" in told
+    assert "row 5: it is missing, and the anchor names it" in output
+    assert "the head kept beside the database is missing" in output
     trail(1)
     with reading(folder) as connection:
         last = connection.exec_driver_sql("SELECT seq, action FROM audit WHERE seq > 3 ORDER BY seq").all()
     assert last[0].action == "audit.continued"
     assert last[0].seq > 5, "no number is given twice"
-    code, told = station("audit", "verify")
+    code, output = station("audit", "verify")
     assert code == 1
-    assert f"row {last[0].seq}: rows before it are missing: a start found up to row 3 here" in told
+    assert f"row {last[0].seq}: rows before it are missing: a start found up to row 3 here" in output
     assert station("audit", "verify", "--since", str(last[1].seq))[0] == 0
 
 
 def test_after_a_restoring_the_trail_is_whole_and_tells_what_is_missing(trail, folder, station, meddle, tmp_path):
     copy = tmp_path / "copy"
     trail(3)
-    code, told = station("records", "backup", str(copy))
+    code, output = station("records", "backup", str(copy))
     assert code == 0
-    anchor = told.split()[-1]
+    anchor = output.split()[-1]
     assert json.loads((copy / "backup.json").read_text())["audit_head"] == anchor
     trail(2)
     lost = station("audit", "verify")[1].split()[-1]
     assert station("records", "restore", str(copy), "--by", "Ida")[0] == 0
-    code, told = station("audit", "verify", "--anchor", anchor)
+    code, output = station("audit", "verify", "--anchor", anchor)
     assert code == 0
-    assert "Ida put back a backup that ends with row 3; rows up to 5 are in the records that were moved aside" in told
-    assert "OK 4 rows" in told
+    assert "Ida put back a backup that ends with row 3; rows up to 5 are in the records that were moved aside" in output
+    assert "OK 4 rows" in output
     trail(1)
     assert station("audit", "verify")[0] == 0
     assert "row 5: it is missing" in station("audit", "verify", "--anchor", lost)[1]
@@ -162,10 +162,10 @@ def test_a_restore_whose_head_could_not_be_saved_is_a_note_and_no_break(copy, st
         patch.setattr("station.records.audit_head.save_head", _full)
         assert station("records", "restore", str(copy), "--by", "Ida")[0] == 0
     start()
-    code, told = station("audit", "verify")
-    assert code == 0, told
-    assert "Ida put back a backup that ends with row 3; rows up to 5 are in the records that were moved aside" in told
-    assert "without a signed head" in told
+    code, output = station("audit", "verify")
+    assert code == 0, output
+    assert "Ida put back a backup that ends with row 3; rows up to 5 are in the records that were moved aside" in output
+    assert "without a signed head" in output
 
 
 def _full(*_):
@@ -176,21 +176,21 @@ def test_a_backup_put_back_on_another_machine_has_a_whole_trail(trail, folder, s
     trail(3)
     station("records", "backup", str(tmp_path / "copy"))
     folder.rename(tmp_path / "the other machine's")
-    code, told = station("records", "restore", str(tmp_path / "copy"), "--by", "Ida")
-    assert (code, "give the public key of the station that made it" in told) == (1, True)
+    code, output = station("records", "restore", str(tmp_path / "copy"), "--by", "Ida")
+    assert (code, "give the public key of the station that made it" in output) == (1, True)
     key = str(tmp_path / "the other machine's" / "public_key.pem")
     assert station("records", "restore", str(tmp_path / "copy"), "--by", "Ida", "--public-key", key)[0] == 0
-    code, told = station("audit", "verify")
-    assert (code, "note" in told) == (0, False)
-    assert told.startswith("OK 4 rows, the last one is 4:")
+    code, output = station("audit", "verify")
+    assert (code, "note" in output) == (0, False)
+    assert output.startswith("OK 4 rows, the last one is 4:")
 
 
 def test_a_backup_of_a_trail_that_was_cut_says_so(trail, station, meddle, tmp_path):
     trail(5)
     meddle("DELETE FROM audit WHERE seq > 3")
-    code, told = station("records", "backup", str(tmp_path / "copy"))
+    code, output = station("records", "backup", str(tmp_path / "copy"))
     assert code == 0
-    assert "note: the audit trail lacks rows that it had" in told
+    assert "note: the audit trail lacks rows that it had" in output
 
 
 def test_the_trail_goes_on_where_the_database_was_lost(trail, folder, station):
@@ -198,9 +198,9 @@ def test_the_trail_goes_on_where_the_database_was_lost(trail, folder, station):
     for file in folder.glob("records.sqlite3*"):
         file.unlink()
     trail(1)
-    code, told = station("audit", "verify")
+    code, output = station("audit", "verify")
     assert code == 1
-    assert "a start found no rows here, and row 4 was known to be the last" in told
+    assert "a start found no rows here, and row 4 was known to be the last" in output
 
 
 def test_the_station_writes_to_the_same_trail_as_a_command_beside_it(trail, folder, station):
@@ -253,7 +253,7 @@ def test_a_malformed_entry_is_refused(trail, station, values):
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30, deadline=None)
 @given(st.lists(st.integers(1, 2**31), min_size=1, max_size=8), st.integers(0, 200), st.integers(0, 255))
 def test_a_torn_line_of_the_head_leaves_the_one_before(tmp_path, numbers, place, byte):
-    """Whatever single byte of the file is spoilt, the head is one of the last two, or the last."""
+    """For any single spoilt byte of the file, the head is one of the last two, or the last."""
     (tmp_path / "audit_head").unlink(missing_ok=True)
     heads = [Head(number, f"{number:064x}") for number in sorted(set(numbers))]
     for head in heads:

@@ -21,26 +21,26 @@ DEADLINE_S = 0.2
 
 @pytest.fixture
 def slow(monkeypatch):
-    """Make a request of the records wait in the writer's thread: the events that it has begun, and that it may end."""
+    """Make a request of the records wait in the writer's thread; return the events "started" and "may end"."""
 
     def make(request):
-        begun, gate = threading.Event(), threading.Event()
+        started, gate = threading.Event(), threading.Event()
         carry_out = getattr(module, request)
 
         def slowly(*arguments):
-            begun.set()
+            started.set()
             gate.wait(30)
             return carry_out(*arguments)
 
         monkeypatch.setattr(module, request, slowly)
-        return begun, gate
+        return started, gate
 
     return make
 
 
-async def pass_deadline(begun):
+async def pass_deadline(started):
     """Wait until the request is under way and the records' deadline has passed."""
-    while not begun.is_set():
+    while not started.is_set():
         await asyncio.sleep(0.005)
     await asyncio.sleep(2 * DEADLINE_S)
 
@@ -70,11 +70,11 @@ def entry(subject):
 def test_an_entry_that_outlasts_the_deadline_is_one_row(opened, scenario, folder, slow, *, cancelled):
     async def steps():
         async with opened(deadline_s=DEADLINE_S) as records:
-            begun, gate = slow("append_audit")
+            started, gate = slow("append_audit")
             logger = AuditLogger(records)
             running = asyncio.create_task(logger.run())
             logger.log(entry("a"))
-            await pass_deadline(begun)
+            await pass_deadline(started)
             if cancelled:
                 await end(running)
             gate.set()
@@ -90,11 +90,11 @@ def test_the_oldest_entry_that_is_lost_is_not_the_one_being_written(opened, scen
 
     async def steps():
         async with opened() as records:
-            begun, gate = slow("append_audit")
+            started, gate = slow("append_audit")
             logger = AuditLogger(records)
             running = asyncio.create_task(logger.run())
             logger.log(entry("a"))
-            await pass_deadline(begun)
+            await pass_deadline(started)
             logger.log(entry("b"), entry("c"))
             logger.log(entry("d"), entry("e"), entry("f"))
             gate.set()
@@ -111,11 +111,11 @@ def test_an_alarm_that_outlasts_the_deadline_is_one_row_of_the_log(opened, scena
 
     async def steps():
         async with opened(deadline_s=DEADLINE_S) as records:
-            begun, gate = slow("replace_alarms")
+            started, gate = slow("replace_alarms")
             alarms = AlarmManager(Metrics("0", 15.0))
             storing = asyncio.create_task(alarms.store_changes(records))
             alarms.raise_(AlarmId.DISK_LOW, verbatim("2 GB left"))
-            await pass_deadline(begun)
+            await pass_deadline(started)
             gate.set()
             alarms.raise_(AlarmId.HMI_LOST, verbatim("silent"))
             while AlarmId.HMI_LOST not in logged():
@@ -134,11 +134,11 @@ def test_alarm_changes_beyond_the_most_that_wait_drop_the_oldest_alone(opened, s
 
     async def steps():
         async with opened() as records:
-            begun, gate = slow("replace_alarms")
+            started, gate = slow("replace_alarms")
             alarms = AlarmManager(Metrics("0", 15.0))
             storing = asyncio.create_task(alarms.store_changes(records))
             alarms.raise_(AlarmId.DISK_LOW, verbatim("2 GB left"))
-            await pass_deadline(begun)
+            await pass_deadline(started)
             for alarm in (AlarmId.HMI_LOST, AlarmId.OUTBOX_BEHIND, AlarmId.CAMERA_LOST):
                 alarms.raise_(alarm, verbatim("now"))
             gate.set()
@@ -155,11 +155,11 @@ def test_entries_that_a_slow_disk_has_not_taken_by_the_end_are_logged(opened, sc
 
     async def steps():
         async with opened() as records:
-            begun, gate = slow("append_audit")
+            started, gate = slow("append_audit")
             logger = AuditLogger(records)
             running = asyncio.create_task(logger.run())
             logger.log(entry("under way"), entry("waiting"))
-            await pass_deadline(begun)
+            await pass_deadline(started)
             await end(running)
             logger.log(entry("the end"))
             await logger.flush()

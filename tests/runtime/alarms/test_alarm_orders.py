@@ -18,7 +18,7 @@ BIT = 1 << (ALARMS[AlarmId.NO_RECIPE].number - 1)
 
 @pytest.fixture
 def alarms(tmp_path):
-    """Run a command of the line as a person would: its exit code, and what it said."""
+    """Run a command as a person would; return its exit code and its output."""
 
     async def beside(*arguments):
         return await asyncio.to_thread(call, *arguments, "--config", tmp_path / "station.yaml")
@@ -37,10 +37,10 @@ def test_a_person_sees_acknowledges_and_shelves_an_alarm_and_the_trail_tells_who
             async with asyncio.timeout(60):
                 while not await word():
                     await asyncio.sleep(0.05)
-            code, said = await alarms("alarms", "list")
+            code, output = await alarms("alarms", "list")
             assert code == 0
-            assert "no_recipe (medium, unacknowledged) since 20" in said
-            assert str(ALARMS[AlarmId.NO_RECIPE].action) in said
+            assert "no_recipe (medium, unacknowledged) since 20" in output
+            assert str(ALARMS[AlarmId.NO_RECIPE].action) in output
             for _ in range(2):
                 assert await alarms("alarms", "acknowledge", "no_recipe", "--by", "Ida") == (
                     0,
@@ -49,12 +49,12 @@ def test_a_person_sees_acknowledges_and_shelves_an_alarm_and_the_trail_tells_who
             shelve = ("alarms", "shelve", "no_recipe", "--minutes", "30", "--by", "Ida", "--reason", "cleaning")
             assert await alarms(*shelve) == (0, "no_recipe is shelved for 30 min\n")
             assert not await word(), "the PLC does not see it either"
-            code, said = await alarms(*shelve)
-            assert (code, "shelved until" in said, "by Ida" in said) == (1, True, True)
+            code, output = await alarms(*shelve)
+            assert (code, "shelved until" in output, "by Ida" in output) == (1, True, True)
             assert "no_recipe (medium) is shelved until 20" in (await alarms("alarms", "list"))[1]
             assert (await alarms("alarms", "unshelve", "no_recipe", "--by", "Bo"))[0] == 0
             assert await word()
-            told = cell.station.service.registry.records
+            records = cell.station.service.registry.records
             async with asyncio.timeout(60):
                 while "alarm.unshelved" not in (rows := (await alarms("audit", "show", "--action", "alarm."))[1]):
                     await asyncio.sleep(0.1)
@@ -62,7 +62,7 @@ def test_a_person_sees_acknowledges_and_shelves_an_alarm_and_the_trail_tells_who
             assert "cleaning" in rows
             assert "Ida" in rows
             assert "Bo" in rows
-            assert told.status().failures == {}
+            assert records.status().failures == {}
 
     asyncio.run(scenario())
 
@@ -121,8 +121,8 @@ def test_without_a_station_it_is_said(alarms, settings_file):
     settings_file()
 
     async def scenario():
-        code, said = await alarms("alarms", "list")
+        code, output = await alarms("alarms", "list")
         assert code == 1
-        assert "did not answer ListAlarms within 5 s; alarms are a running station's" in said
+        assert "did not answer ListAlarms within 5 s; alarms are a running station's" in output
 
     asyncio.run(scenario())

@@ -36,7 +36,7 @@ WATCHED = {
         ("over_temperature", 1.0, AlarmId.GRIPPER_FAULT),
     ],
 }
-LOOKED_AT = [
+REFERENCE_FAULTS = [
     ("led_dead", 1.0, AlarmId.CAMERA_LED_DEAD, True),
     ("lens_fogged", 1.0, AlarmId.CAMERA_DIRTY, True),
     ("dirt", 5.0, AlarmId.REFERENCE_BAD, True),
@@ -79,7 +79,7 @@ def test_a_reference_that_cannot_serve_says_what_is_wrong_with_the_gel(bench):
         async with bench(reference={"most_drift_levels": 18.0}) as cell:
             await cell.choose("blueberry")
             await cell.line.inspect()  # its reference is the golden one
-            for fault, amount, alarm, refused in LOOKED_AT:
+            for fault, amount, alarm, refused in REFERENCE_FAULTS:
                 await cell.line.ready()
                 cell.twin.boards["camera"].set(fault, amount)
                 drawn = cell.twin.camera.drawn
@@ -89,7 +89,7 @@ def test_a_reference_that_cannot_serve_says_what_is_wrong_with_the_gel(bench):
                 assert alarm in active(cell), fault
                 cell.twin.boards["camera"].clear()
             await cell.line.inspect()
-            assert not any(caused(cell, alarm) for _, _, alarm, _ in LOOKED_AT)
+            assert not any(caused(cell, alarm) for _, _, alarm, _ in REFERENCE_FAULTS)
             text = cell.station.service._metrics.exposition()[0].decode()
             assert 'station_references_refused_total{id="camera_led_dead"} 1.0' in text
             assert 'station_references_refused_total{id="reference_bad"} 2.0' in text

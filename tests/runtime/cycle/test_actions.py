@@ -1,4 +1,4 @@
-"""The inspector's actions on devices that only note what is asked of them."""
+"""The inspector's actions on devices that only record the requests to them."""
 
 import asyncio
 from collections import defaultdict

@@ -1,4 +1,4 @@
-"""Centring over the twin's wire: a fruit laid off the middle is cut by the border where it lies, and passes centred."""
+"""Centring over the twin's wire: a fruit laid off the middle is cut by the border at its place, and passes centred."""
 
 import asyncio
 

@@ -36,14 +36,14 @@ def test_every_fault_is_an_event_of_the_cycle(fault, event):
 
 
 class Script:
-    """A performer whose actions end as told, or never."""
+    """A performer whose actions end as given, or never."""
 
     def __init__(self, ends):
         self.ends = ends
-        self.begun, self.alarms, self.unexpected, self.halts = [], [], [], 0
+        self.started, self.alarms, self.unexpected, self.halts = [], [], [], 0
 
     def perform(self, action, because):
-        self.begun.append(action)
+        self.started.append(action)
         if action not in self.ends:
             return None
 
@@ -110,7 +110,7 @@ def test_actions_lead_on_and_an_unlisted_event_is_counted(caplog):
 
     conduct(script, scenario)
     assert script.unexpected == [(State.UNKNOWN, Event.PLACED)]
-    assert script.begun == [
+    assert script.started == [
         Action.READ_DEVICES,
         Action.CLOSE_UNFINISHED,
         Action.OPEN_JAWS,

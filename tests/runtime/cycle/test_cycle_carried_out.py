@@ -47,5 +47,5 @@ def test_each_action_of_the_table_is_carried_out_by_exactly_one_part():
     )
     carriers["HALT"] += 1  # the runner's own: it forgets what is under way
     assert dict(carriers) == dict.fromkeys(Action.__members__, 1)
-    asked = {action for transition in TABLE.values() for action in transition.actions}
-    assert asked == set(Action) | {action for action in asked if isinstance(action, Raise)}
+    actions = {action for transition in TABLE.values() for action in transition.actions}
+    assert actions == set(Action) | {action for action in actions if isinstance(action, Raise)}

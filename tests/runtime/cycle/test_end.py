@@ -25,7 +25,7 @@ def test_an_end_whose_clean_up_takes_longer_than_its_deadline_keeps_the_fruits_o
         async with bench(file) as cell:
             await cell.choose("blueberry")
             await cell.line.ready()
-            begun = await cell.line.begin()
+            reply = await cell.line.begin()
             await cell.reach(State.CLOSING_TO_ONSET)
             service = cell.station.service
             service._of_station = {**service._of_station, Action.OPEN_JAWS: held, Action.GO_HOME: held}
@@ -34,12 +34,12 @@ def test_an_end_whose_clean_up_takes_longer_than_its_deadline_keeps_the_fruits_o
             async with asyncio.timeout(PATIENCE_S):
                 await asyncio.shield(cell.running)
         async with bench(file) as cell:
-            return begun, (await cell.line.open()).outcomes
+            return reply, (await cell.line.open()).outcomes
 
     with caplog.at_level(logging.WARNING, "station.runtime.station"):
-        begun, outcomes = asyncio.run(scenario())
+        reply, outcomes = asyncio.run(scenario())
     assert "ended after 1 s in the middle of" in caplog.text
-    assert [(each.sequence, each.outcome) for each in outcomes] == [(begun.sequence, "NO_RESULT")]
+    assert [(each.sequence, each.outcome) for each in outcomes] == [(reply.sequence, "NO_RESULT")]
     assert outcomes[0].reasons == (Reason.STATION_LOST,), "it was not stored in time: the next start does that"
 
 

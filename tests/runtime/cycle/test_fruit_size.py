@@ -57,8 +57,8 @@ def test_wrong_and_stale_sizes_are_recorded_and_echoed_as_they_were_given(
     place.write_text(json.dumps(recipe))
     outcomes = {}
     assert asyncio.run(scenario()) == {name: (size, size) for name, (_, size) in given.items()}
-    told = dict(zip(given, outcomes.values(), strict=True))
-    assert told["impossible"] == told["contradiction"] == ("NO_RESULT", ("size_unknown",))
-    assert {told[name] for name in ("absent", "length and class", "stale", "0")} == {("PASS", ())}, (
+    by_name = dict(zip(given, outcomes.values(), strict=True))
+    assert by_name["impossible"] == by_name["contradiction"] == ("NO_RESULT", ("size_unknown",))
+    assert {by_name[name] for name in ("absent", "length and class", "stale", "0")} == {("PASS", ())}, (
         "by the fallback too"
     )

@@ -1,4 +1,4 @@
-"""Holds that only a person may end: found again by the next start, at whatever step the station was killed."""
+"""Holds that only a person may end: found again by the next start, after a kill at any step."""
 
 import asyncio
 import subprocess
@@ -56,7 +56,7 @@ def killed_at(tmp_path):
 
 
 def start(folder):
-    """A start after a kill: where it stands once everything but a person has happened, and what it did."""
+    """A start after a kill: its state once everything but a person has happened, and what it did."""
 
     async def scenario():
         hold = hold_of(folder)
@@ -81,13 +81,13 @@ def test_a_station_killed_at_any_step_is_still_held_and_moves_nothing(killed_at,
     step, was_killed, held, began = 0, True, 0, None
     while was_killed:
         folder, state, event, was_killed = killed_at(way, step)
-        began, stands, performed = start(folder)
+        began, remains, performed = start(folder)
         held_as = State.CARRIED if state in FRUIT else State.LATCHED if state in STOPPED_FOR_A_PERSON else None
         if held_as is not None and not ((state, event) in ENDS and began is State.UNKNOWN):
             assert began in (held_as, State.LATCHED if event in LATCHES else held_as), (step, state, event)
         if began is not State.UNKNOWN:
             held += 1
-            assert STATES[stands].needs_person, (step, stands)
+            assert STATES[remains].needs_person, (step, remains)
             assert set(performed) <= NOTHING_MOVES, (step, performed)
         step += 1
     assert held > len(WAYS[way]) / 4

@@ -1,4 +1,4 @@
-"""Triggers while the arm leaves the fruit before: accepted at once, begun when it has left, each with one outcome."""
+"""Triggers while the arm leaves the fruit before: accepted at once, started when it has left, each with one outcome."""
 
 import asyncio
 import json
@@ -42,10 +42,10 @@ def test_a_trigger_is_accepted_while_the_arm_leaves_and_a_fault_then_gives_it_on
             await ready_with_arm(cell)
 
             first = await inspected_until_leaving(cell)
-            begun = await line.begin()
-            assert begun.refusal is None
+            reply = await line.begin()
+            assert reply.refusal is None
             cell.twin.boards["arm"].clear()
-            second = await line.outcome(begun.sequence)
+            second = await line.outcome(reply.sequence)
             await line.publish(second)
             assert (first.outcome, second.outcome) == ("PASS", "PASS")
             assert second.sequence == first.sequence + 1
@@ -54,8 +54,8 @@ def test_a_trigger_is_accepted_while_the_arm_leaves_and_a_fault_then_gives_it_on
 
             await inspected_until_leaving(cell)
             cell.at(State.RETREATING_ACCEPTED, lambda: cell.twin.boards["gripper"].set("off"))
-            begun = await line.begin()
-            lost = await line.outcome(begun.sequence)
+            reply = await line.begin()
+            lost = await line.outcome(reply.sequence)
             await line.publish(lost)
             assert (lost.outcome, lost.reasons[0]) == ("NO_RESULT", Reason.GRIPPER_FAULT)
             cell.twin.boards["arm"].clear()
@@ -84,7 +84,7 @@ def test_a_stop_while_the_arm_leaves_lets_no_trigger_in(bench):
 @pytest.mark.timeout(240)
 def test_each_stop_of_a_person_is_carried_out_also_after_a_start_while_the_arm_leaves(bench):
     """The first *Stop* is under way until the arm has left, and the *Start* in between has lifted it."""
-    kept = []
+    stored = []
 
     async def scenario():
         async with bench(bench=False) as cell:
@@ -100,10 +100,10 @@ def test_each_stop_of_a_person_is_carried_out_also_after_a_start_while_the_arm_l
                     assert cell.phase is State.RETREATING_READY or order != "start"
             cell.twin.boards["arm"].clear()
             await cell.reach(State.STOPPED)
-            kept.append((configuration.home / "stopped_by_a_person").read_bytes())
+            stored.append((configuration.home / "stopped_by_a_person").read_bytes())
 
     asyncio.run(scenario())
-    assert kept == [b"yes"]
+    assert stored == [b"yes"]
 
 
 def test_jaws_that_leave_are_wider_than_a_fruit_that_the_recipe_does_not_expect(bench, settings_file, tmp_path):

@@ -22,9 +22,9 @@ def test_a_trigger_is_not_refused_by_a_stop_that_comes_right_after_it_became_dur
             monkeypatch.setattr(service.registry.records, "begin", stopped_at_the_end)
             at_stop = []
             cell.at(State.STOPPED, lambda: at_stop.append(service._now))
-            begun = await cell.line.begin()
-            assert begun.refusal is None
-            outcome = await cell.line.outcome(begun.sequence)
+            reply = await cell.line.begin()
+            assert reply.refusal is None
+            outcome = await cell.line.outcome(reply.sequence)
             assert (outcome.outcome, outcome.reasons[0]) == ("NO_RESULT", Reason.CALLED_OFF)
             assert at_stop == [None], "it was stopped before its inspection began"
 

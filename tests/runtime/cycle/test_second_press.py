@@ -14,7 +14,7 @@ from station.whatif.stored import read_stored, snapshots
 from tests.stored_inspection import read_record
 
 FRUIT, OFF_MM = 16, 3.0
-"""Where it lies, the border cuts it in every press; in the middle, in none, however long the flesh creeps."""
+"""At its place, the border cuts it in every press; in the middle, in none, however long the flesh creeps."""
 
 
 @pytest.fixture

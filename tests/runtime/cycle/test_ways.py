@@ -117,8 +117,8 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
 
             cell.lay("blueberry", 1)
             cell.at(State.PLACING_ACCEPT, lambda: cell.twin.boards["gripper"].set("off"))
-            kept = await line.inspect()
-            assert kept.outcome == "PASS"
+            held = await line.inspect()
+            assert held.outcome == "PASS"
             await cell.until(lambda: cell.phase is State.CARRIED and AlarmId.FRUIT_HELD in active(cell))
             state = await line.state()
             assert (state.ready, state.packml_state) == (False, PackmlState.HELD)
@@ -133,19 +133,23 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
             assert AlarmId.FRUIT_HELD not in active(cell)
             assert places_of(cell) == ["above_nest"]
 
-            crew = cell.station.service._devices
-            renew, crew.renew_health = crew.renew_health, lambda: None
-            # A controller that stands still itself, as on a busy machine, forgives a silence: not this one.
+            device_manager = cell.station.service._devices
+            renew, device_manager.renew_health = device_manager.renew_health, lambda: None
+            # A controller that pauses itself, as on a busy machine, forgives a silence: not this one.
             forgive, arm.script.stood_still = arm.script.stood_still, forgive_nothing
-            restart, restarted = crew.restart_program, []
+            restart, restarted = device_manager.restart_program, []
 
             async def restart_once_healthy():
-                restarted.append((crew.needs_program_restart, active(cell), (await line.state()).ready))
-                crew.renew_health, crew.restart_program, arm.script.stood_still = renew, restart, forgive
+                restarted.append((device_manager.needs_program_restart, active(cell), (await line.state()).ready))
+                device_manager.renew_health, device_manager.restart_program, arm.script.stood_still = (
+                    renew,
+                    restart,
+                    forgive,
+                )
                 await restart()
 
-            # Looked at as it begins: the station is quicker than a test that asks now and then.
-            crew.restart_program = restart_once_healthy
+            # Checked as it begins: the station is quicker than a test that polls.
+            device_manager.restart_program = restart_once_healthy
             await cell.until(lambda: restarted)
             [(needed, alarms, ready)] = restarted
             assert needed
@@ -154,9 +158,9 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
             await line.ready()
 
             faults = cell.twin.boards["arm"]
-            faults.set("registers_in_use")  # which is told to new clients alone
+            faults.set("registers_in_use")  # which only new clients are sent
             faults.set("link_cut")
-            await cell.until(lambda: "arm" in crew.faults)
+            await cell.until(lambda: "arm" in device_manager.faults)
             faults.clear("link_cut")
             await cell.until(lambda: AlarmId.ARM_NOT_REMOTE in active(cell))
             fault = ArmFault(ArmCause.REGISTERS_IN_USE, arm_messages.REGISTERS_IN_USE())
@@ -164,7 +168,7 @@ def test_the_arm_places_fruit_and_needs_a_person_for_one_that_it_keeps_but_none_
             depths = []
             for _ in range(5):  # as often as it is checked while it waits for a person, all night perhaps
                 with pytest.raises(ArmFault) as caught:
-                    await crew._check_arm()
+                    await device_manager._check_arm()
                 depths.append(len(list(traceback.walk_tb(caught.value.__traceback__))))
             assert depths == 5 * depths[:1]
             faults.clear()
@@ -206,24 +210,24 @@ def test_an_outcome_that_the_disk_refuses_is_not_told_and_becomes_no_result_once
             before = resource.getrlimit(resource.RLIMIT_FSIZE)
             cell.at(State.JUDGING, lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1])))
             try:
-                begun = await line.begin()
-                asked = asyncio.create_task(line.outcome(begun.sequence))
+                reply = await line.begin()
+                awaited = asyncio.create_task(line.outcome(reply.sequence))
                 await cell.until(lambda: cell.phase is State.HELD and AlarmId.RECORDS_NOT_WRITABLE in active(cell))
                 state = await line.state()
                 assert not state.ready
                 assert "records" in str(state.why_not_ready)
-                assert not asked.done(), "what is not durable is not told"
+                assert not awaited.done(), "what is not durable is not published"
             finally:
                 resource.setrlimit(resource.RLIMIT_FSIZE, before)
-            outcome = await asked
-            assert (outcome.sequence, outcome.outcome) == (begun.sequence, "NO_RESULT")
+            outcome = await awaited
+            assert (outcome.sequence, outcome.outcome) == (reply.sequence, "NO_RESULT")
             assert set(outcome.reasons) <= {Reason.RECORDS_FAULT, Reason.STATION_LOST}
             await line.publish(outcome)
             await line.ready()
             await cell.until(lambda: AlarmId.RECORDS_NOT_WRITABLE not in active(cell))
             assert cell.twin.world.opening_mm() == pytest.approx(85, abs=1)
             again = await line.inspect()
-            assert again.sequence == begun.sequence + 1
+            assert again.sequence == reply.sequence + 1
             assert again.area_mm2 is not None
 
     asyncio.run(scenario())

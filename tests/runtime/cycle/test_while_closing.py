@@ -90,18 +90,18 @@ def test_an_area_over_the_early_stop_ends_the_motion_on_its_way(inspected):
 
 @pytest.mark.timeout(180)
 def test_what_one_frame_on_the_way_says_is_asked_of_the_image_at_rest_and_else_the_steps_go_on(inspected, monkeypatch):
-    told, ends_steps = [], stop.ends_steps
+    stopped_at_mm, ends_steps = [], stop.ends_steps
 
     def once(press, recipe):
         closing_mm = press.points[-1].closing_mm
-        if not told and closing_mm > 1.0:
-            told.append(closing_mm)
+        if not stopped_at_mm and closing_mm > 1.0:
+            stopped_at_mm.append(closing_mm)
             return True
         return ends_steps(press, recipe)
 
     monkeypatch.setattr(stop, "ends_steps", once)
     outcome, record = inspected()
-    [ended_mm] = told
+    [ended_mm] = stopped_at_mm
     closings_mm = [point.closing_mm for point in record.judged.curve]
     assert outcome.outcome == "PASS", record.judged.explanation
     assert any(ended_mm < each < 2.9 for each in closings_mm), "at rest, where the motion was ended"

@@ -24,7 +24,7 @@ PRESSED_MM = 40.0
 
 
 class Devices:
-    """A gripper and an arm in one, which note what they are asked to do."""
+    """A gripper and an arm in one, which record the requests to them."""
 
     max_width_mm = OPEN_MM
 

@@ -28,8 +28,8 @@ def test_a_fault_in_mid_inspection_is_one_no_result_and_passes(bench, faults):
                 await cell.line.ready()
                 assert (await cell.line.order(CommandName.CLEAR_ALARMS)).done
                 cell.at(phase, lambda device=device, fault=fault: cell.twin.boards[device].set(fault))
-                begun = await cell.line.begin()
-                outcome = await cell.line.outcome(begun.sequence)
+                reply = await cell.line.begin()
+                outcome = await cell.line.outcome(reply.sequence)
                 assert outcome.outcome == "NO_RESULT", fault
                 assert reason in outcome.reasons, (fault, outcome)
                 state = await cell.line.state()

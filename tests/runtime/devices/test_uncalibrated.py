@@ -1,4 +1,4 @@
-"""A unit without a calibration takes no fruit, and says what to do; it goes on by itself once it has one."""
+"""A unit without a calibration takes no fruit, and reports what to do; it goes on by itself once it has one."""
 
 import asyncio
 import time
@@ -20,7 +20,7 @@ TRIGGER_AND_ENABLE = 3
 
 
 async def until(holds, plc, cell):
-    """Wait until something holds; a failure says what PLC and station were at meanwhile."""
+    """Wait until something holds; a failure reports the state of PLC and station meanwhile."""
     deadline_s = time.monotonic() + 90
     while not await holds():
         assert time.monotonic() < deadline_s, (
@@ -52,7 +52,7 @@ def test_triggers_are_refused_with_the_remedy_until_the_sensor_is_calibrated(ben
             state = await cell.line.state()
             assert state.why_not_ready == calibration.REQUIRED()
             with reading(cell.station.service.registry.records.folder) as connection:
-                assert find_page(connection, Query()).rows == (), "nothing was begun or lost"
+                assert find_page(connection, Query()).rows == (), "nothing was started or lost"
 
             await plc.write({"control": 1})
             shipped = cell.configuration.model_copy(update={"recipes_folder": Configuration().recipes_folder})

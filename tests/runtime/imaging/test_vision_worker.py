@@ -42,7 +42,7 @@ def previous_contacts():
 
 @pytest.fixture
 def seen_images(monkeypatch, previous_contacts):
-    """The images that the worker's method was asked to measure, by their identity, in order."""
+    """The images that the worker's method measured, by their identity, in order."""
     seen: list[int] = []
 
     def counting(reference, segmentation):

@@ -13,7 +13,7 @@ from station.settings.recipe import find_recipe
 
 @pytest.fixture
 def inspected(bench, settings_file):
-    """The configuration's file of a station that has inspected a fruit, passed it and kept its images."""
+    """The configuration's file of a station that has inspected a fruit, passed it and stored its images."""
     file = settings_file()
     values = json.loads(file.read_text())
     values["records"]["accepted_share"] = 1.0
@@ -49,9 +49,9 @@ def test_a_draft_with_another_segmentation_measures_the_stored_images_again(insp
         assert done.exit_code == 0, (done.output, done.exception)
         return done.output, out
 
-    told, out = whatif("other", edge_stiffness=1.5)
-    assert "1 inspections, 1 decided by the draft" in told
-    assert "1 measured again in their stored images" in told
+    output, out = whatif("other", edge_stiffness=1.5)
+    assert "1 inspections, 1 decided by the draft" in output
+    assert "1 measured again in their stored images" in output
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["measured_again"], summary["not_reproduced"], summary["newly_rejected"]) == (1, 0, 1)
     _, line = (out / "replayed.jsonl").read_text().splitlines()
@@ -63,16 +63,18 @@ def test_a_draft_with_another_segmentation_measures_the_stored_images_again(insp
     assert "data:image/jpeg;base64," in page
     assert page.count('<polyline class="curve ') == 2, "the curve of then, and the draft's"
 
-    told, out = whatif("same")
-    assert "measured again" not in told
+    output, out = whatif("same")
+    assert "measured again" not in output
     assert json.loads((out / "summary.json").read_text())["measured_again"] == 0
 
-    told, out = whatif("less_confidence", least_confidence=0.0)
-    assert "1 measured again in their stored images" in told, "a contact is drawn otherwise where confidence is lacking"
+    output, out = whatif("less_confidence", least_confidence=0.0)
+    assert "1 measured again in their stored images" in output, (
+        "a contact is drawn otherwise where confidence is lacking"
+    )
 
     with reading(records_folder(home)) as connection:
         found = connection.exec_driver_sql("SELECT sha256 FROM images WHERE kind = 'step' AND step = 1").scalar()
     (path,) = (records_folder(home) / "images").glob(f"*/{found}.png")
     path.unlink()
-    told, out = whatif("without_one", edge_stiffness=1.5)
-    assert "cannot be known: 1: the draft measures otherwise, and not all of its images were kept" in told
+    output, out = whatif("without_one", edge_stiffness=1.5)
+    assert "cannot be known: 1: the draft measures otherwise, and not all of its images were kept" in output

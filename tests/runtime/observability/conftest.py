@@ -1,4 +1,4 @@
-"""Metrics, health and what they are asked."""
+"""Metrics, health and the requests to them."""
 
 import asyncio
 from collections.abc import Awaitable, Callable

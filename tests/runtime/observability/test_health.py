@@ -59,9 +59,9 @@ def get(port, path, method="GET"):
 
 @pytest.fixture
 def served(server, scenario):
-    """Ask a running server in a thread of the test's own."""
+    """Send requests to a running server in a thread of the test's own."""
 
-    def ask(*questions):
+    def get_all(*questions):
         async def steps():
             health = server()
             port = await health.start()
@@ -73,7 +73,7 @@ def served(server, scenario):
 
         return scenario(steps)
 
-    return ask
+    return get_all
 
 
 def test_metrics_are_served(served, metrics):
@@ -87,9 +87,9 @@ def test_metrics_are_served(served, metrics):
 def test_not_ready_is_503_with_each_dependencys_remedy(served, readiness):
     ((status, content_type, body),) = served(("/readyz",))
     assert (status, content_type) == (503, "application/json")
-    said = json.loads(body)
-    assert said["why"] == str(NOT_READY.why)
-    assert said["dependencies"][1] == {
+    data = json.loads(body)
+    assert data["why"] == str(NOT_READY.why)
+    assert data["dependencies"][1] == {
         "name": "camera",
         "state": "fault",
         "age_s": 4.2,
@@ -98,7 +98,7 @@ def test_not_ready_is_503_with_each_dependencys_remedy(served, readiness):
         "remedy": "plug it in",
         "remedy_message": {"id": "text.verbatim", "parameters": {"text": "plug it in"}},
     }
-    assert said["dependencies"][2]["age_s"] is None
+    assert data["dependencies"][2]["age_s"] is None
     readiness[0] = Readiness(ready=True, why=None, dependencies=())
     assert served(("/readyz",))[0][0] == 200
 
@@ -134,9 +134,9 @@ def test_a_port_in_use_is_one_clear_sentence(server, scenario):
     async def steps():
         first = server()
         port = await first.start()
-        with pytest.raises(AddressError) as told:
+        with pytest.raises(AddressError) as caught:
             await server(port=port).start()
-        assert str(told.value) == (
+        assert str(caught.value) == (
             f"metrics and health cannot be served on 127.0.0.1:{port}: another program listens there; "
             "stop it, or set another metrics.port"
         )
@@ -149,11 +149,11 @@ def test_a_port_in_use_is_one_clear_sentence(server, scenario):
 
 
 @pytest.mark.parametrize(
-    ("host", "says"), [("192.0.2.1", "no address of this machine"), ("no such host", "metrics.host")]
+    ("host", "message"), [("192.0.2.1", "no address of this machine"), ("no such host", "metrics.host")]
 )
-def test_an_address_of_another_machine_is_told(server, scenario, host, says):
+def test_an_address_of_another_machine_is_told(server, scenario, host, message):
     async def steps():
-        with pytest.raises(AddressError, match=says):
+        with pytest.raises(AddressError, match=message):
             await server(host=host).start()
 
     scenario(steps)
@@ -192,7 +192,7 @@ def test_many_ask_at_once_and_no_thread_serves_them(server, scenario):
         before = threading.active_count()
         port = await health.start()
 
-        async def ask():
+        async def get_version():
             reader, writer = await asyncio.open_connection("127.0.0.1", port)
             writer.write(b"GET /version HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
             answer = await reader.read()
@@ -200,7 +200,7 @@ def test_many_ask_at_once_and_no_thread_serves_them(server, scenario):
             await writer.wait_closed()
             return answer
 
-        answers = await asyncio.gather(*(ask() for _ in range(20)))
+        answers = await asyncio.gather(*(get_version() for _ in range(20)))
         assert all(answer.startswith(b"HTTP/1.1 200") for answer in answers)
         assert threading.active_count() == before
         await health.close()

@@ -34,7 +34,7 @@ def scraped(metrics):
     }
 
 
-def everything_told(metrics, outcome):
+def record_everything(metrics, outcome):
     metrics.inspection("strawberry", outcome, {"approach": 0.8}, 9.5)
     failed = outcome.model_copy(update={"outcome": "FAIL", "reasons": (Reason.AREA_OVER_LIMIT, Reason.EARLY_STOP)})
     metrics.inspection("strawberry", failed)
@@ -55,12 +55,12 @@ def everything_told(metrics, outcome):
     metrics.watch_records(lambda: status)
     metrics.watch_calibration(lambda: (86_400.0, 60.0, -0.02))
     metrics.watch_backup(lambda: 1_782_790_452.0)
-    told = DestinationStatus(connected=False, told=7, refused=1, waiting=12, oldest_utc_ms=5, error=None)
-    metrics.watch_outbox(lambda: OutboxStatus(utc_ms=9, destinations={"postgresql": told}))
+    destination = DestinationStatus(connected=False, told=7, refused=1, waiting=12, oldest_utc_ms=5, error=None)
+    metrics.watch_outbox(lambda: OutboxStatus(utc_ms=9, destinations={"postgresql": destination}))
 
 
 def test_everything_in_the_table_is_exposed_and_nothing_else(metrics, outcome):
-    everything_told(metrics, outcome)
+    record_everything(metrics, outcome)
     families = {family.name: family for family in parse(metrics.exposition()[0].decode())}
     own = {name for name in families if name.startswith("station_")}
     wanted = {row.name + ("_info" if row.kind == "info" else "") for row in TABLE.values()}
@@ -75,7 +75,7 @@ def test_everything_in_the_table_is_exposed_and_nothing_else(metrics, outcome):
 
 
 def test_openmetrics_is_served_to_those_who_ask_for_it(metrics, outcome):
-    everything_told(metrics, outcome)
+    record_everything(metrics, outcome)
     content, content_type = metrics.exposition("application/openmetrics-text; version=1.0.0")
     assert content_type.startswith("application/openmetrics-text")
     assert len(list(parse_openmetrics(content.decode()))) > len(TABLE)
@@ -103,7 +103,7 @@ def test_a_fruit_that_the_station_lost_has_no_duration(metrics, outcome):
 
 
 def test_the_figures_are_those_told(metrics, outcome, clock):
-    everything_told(metrics, outcome)
+    record_everything(metrics, outcome)
     clock.now_s += 2.0
     found = scraped(metrics)
     inspections = {key[1:]: value for key, value in found.items() if key[0] == "station_inspections_total"}
@@ -149,8 +149,8 @@ def test_another_system_that_was_never_reached_is_behind_since_the_start(metrics
 
     def lag_s(**values):
         usual = {"connected": False, "told": 0, "refused": 0, "waiting": None, "oldest_utc_ms": None, "error": None}
-        told = DestinationStatus(**dict[str, Any]({**usual, **values}))
-        metrics.watch_outbox(lambda: OutboxStatus(utc_ms=now_ms, destinations={"postgresql": told}))
+        destination = DestinationStatus(**dict[str, Any]({**usual, **values}))
+        metrics.watch_outbox(lambda: OutboxStatus(utc_ms=now_ms, destinations={"postgresql": destination}))
         return scraped(metrics)["station_outbox_lag_seconds", ("destination", "postgresql")]
 
     assert lag_s(away_since_utc_ms=now_ms - 90_000) == pytest.approx(90, abs=30)
@@ -214,10 +214,10 @@ def test_the_counts_equal_the_records(metrics, scenario, tmp_path, outcome):
                 "explanation": (),
             }
             record = InspectionRecord(**(fields | judged))
-            told = await records.conclude(sequence, record)
+            concluded = await records.conclude(sequence, record)
             for _ in range(2):
-                if await records.published(told):
-                    metrics.inspection("", told)
+                if await records.published(concluded):
+                    metrics.inspection("", concluded)
         with reading(tmp_path) as connection:
             rows = find_page(connection, Query()).rows
         totals = Counter((row.fruit or "none", row.outcome, (*row.reasons, "none")[0]) for row in rows)

@@ -34,10 +34,10 @@ def made(state_files: Any = None):
 
 
 def test_a_command_that_waited_to_its_deadline_is_not_begun_afterwards(monkeypatch):
-    begun = []
+    resets = []
 
     async def reset(by):
-        begun.append(by)
+        resets.append(by)
 
     async def main():
         commands = made()
@@ -49,24 +49,24 @@ def test_a_command_that_waited_to_its_deadline_is_not_begun_afterwards(monkeypat
         done = await waiting
         assert not done.done
         assert done.why is not None
-        assert (done.why.id, begun) == (messages.TOO_SLOW.id, [])
+        assert (done.why.id, resets) == (messages.TOO_SLOW.id, [])
         monkeypatch.setattr(plc_commands, "DEADLINE_S", 25.0)
         assert (await commands.execute(RESET)).done
-        assert len(begun) == 1
+        assert len(resets) == 1
         monkeypatch.setattr(plc_commands, "is_expired", lambda: True)
         assert not (await commands.execute(RESET)).done, "the PLC waits no longer than its own setting"
         assert (await commands.execute(RESET, ("anna", "operator"))).done
-        assert len(begun) == 2
+        assert len(resets) == 2
 
     asyncio.run(main())
 
 
 def test_a_stop_is_what_the_file_has_also_where_the_disk_outlasts_the_reset_before(monkeypatch):
-    begun, free, written = threading.Event(), threading.Event(), []
+    started, free, written = threading.Event(), threading.Event(), []
 
     def write(_name, data):
-        if not begun.is_set():
-            begun.set()
+        if not started.is_set():
+            started.set()
             assert free.wait(30)
         written.append(data)
         return True
@@ -121,12 +121,12 @@ class SlowDisk:
     """State files whose writes begin in their order, and end when they are freed."""
 
     def __init__(self) -> None:
-        self.begun, self.free = (threading.Event(), threading.Event()), (threading.Event(), threading.Event())
+        self.started, self.free = (threading.Event(), threading.Event()), (threading.Event(), threading.Event())
         self._writes = 0
 
     def write(self, _name: str, _data: bytes) -> bool:
         number, self._writes = self._writes, self._writes + 1
-        self.begun[number].set()
+        self.started[number].set()
         return self.free[number].wait(30)
 
 
@@ -145,7 +145,7 @@ def test_nothing_begins_by_a_reset_that_waited_for_the_disk_while_a_person_stopp
     async def main():
         commands, station, disk = resetting(State.STOPPED)
         started = asyncio.create_task(commands._reset(("anna", "operator")))
-        assert await asyncio.to_thread(disk.begun[0].wait, 30)
+        assert await asyncio.to_thread(disk.started[0].wait, 30)
         stopping = asyncio.create_task(commands.stop())
         await asyncio.sleep(0)
         disk.free[0].set()
@@ -175,7 +175,7 @@ def test_a_reset_confirms_no_stop_that_came_while_it_waited_for_the_disk(happens
     async def main():
         commands, station, disk = resetting(State.LATCHED)
         started = asyncio.create_task(commands._reset(("anna", "operator")))
-        assert await asyncio.to_thread(disk.begun[0].wait, 30)
+        assert await asyncio.to_thread(disk.started[0].wait, 30)
         happens(station, commands._devices)
         disk.free[0].set()
         assert await started is not None
@@ -190,7 +190,7 @@ def test_a_reset_goes_by_the_state_that_the_station_came_to_while_it_waited_for_
     async def main():
         commands, station, disk = resetting(State.HELD)
         started = asyncio.create_task(commands._reset(("anna", "operator")))
-        assert await asyncio.to_thread(disk.begun[0].wait, 30)
+        assert await asyncio.to_thread(disk.started[0].wait, 30)
         station.state, station.entered_s = State.STOPPED, time.monotonic()
         disk.free[0].set()
         assert await started is None

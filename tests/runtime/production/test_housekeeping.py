@@ -22,7 +22,7 @@ RETREAT = {State.RETREATING, State.RETREATING_READY, State.RETREATING_ACCEPTED}
 
 @pytest.fixture
 def seen(bench, monkeypatch):
-    """Return the states in which freed memory was returned and damage looked for, while a line inspects two fruit."""
+    """Return the states in which freed memory was returned and damage searched for, while a line inspects two fruit."""
     returned, searched = [], []
     # Always due: what is left out by the phase is all that is left out.
     for period, length_s in {"_MEMORY_EVERY_S": 0.0, "_DAMAGE_EVERY_S": 0.0, "PERIOD_S": 0.02}.items():

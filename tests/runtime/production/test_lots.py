@@ -1,4 +1,4 @@
-"""A lot keeps the recipe that it began with, whatever people do to the recipes meanwhile; all of it is in the trail."""
+"""A lot keeps the recipe that it began with while people change the recipes; all of it is in the audit trail."""
 
 import asyncio
 import threading
@@ -66,9 +66,9 @@ def test_edits_and_approvals_within_a_lot_concern_the_next_one(bench):
             assert (await cell.line.inspect()).recipe_checksum == first.recipe_checksum, "the lot goes on"
             await asyncio.to_thread(cell.station.recipes.refresh)
 
-            begun = await begin(cell, 900, "LOT 2")
-            assert begun.refusal is None
-            second = await cell.line.outcome(begun.sequence)
+            reply = await begin(cell, 900, "LOT 2")
+            assert reply.refusal is None
+            second = await cell.line.outcome(reply.sequence)
             await cell.line.publish(second)
             assert second.recipe_checksum != first.recipe_checksum
             record = read_record(cell.station.service.registry.records, second.sequence)
@@ -175,7 +175,7 @@ def test_the_last_recipe_is_what_the_file_has_also_where_the_disk_outlasts_the_l
 
 
 def test_a_trigger_whose_answer_is_not_waited_for_any_more_begins_nothing(bench, monkeypatch):
-    """The PLC was told that it is refused, and may move the fruit."""
+    """The PLC received that it is refused, and may move the fruit."""
     storing, stored = threading.Event(), threading.Event()
 
     async def scenario():
@@ -196,9 +196,9 @@ def test_a_trigger_whose_answer_is_not_waited_for_any_more_begins_nothing(bench,
                 await given_up
             following = asyncio.create_task(begin(cell, 901, "LOT 2"))
             stored.set()
-            begun = await following
-            assert begun.refusal is None
-            assert (await cell.line.outcome(begun.sequence)).trigger_id == 901
+            reply = await following
+            assert reply.refusal is None
+            assert (await cell.line.outcome(reply.sequence)).trigger_id == 901
             assert [each.trigger_id for each in (await cell.line.open()).outcomes] == [901]
 
     asyncio.run(scenario())
@@ -397,11 +397,11 @@ def test_a_lot_that_cannot_be_stored_is_started_or_ended_and_said(bench, monkeyp
 
 
 def test_the_last_lot_is_what_the_file_has_also_where_the_disk_outlasts_the_order_before(tmp_path, monkeypatch):
-    begun, free, write = threading.Event(), threading.Event(), StateFiles.write
+    started, free, write = threading.Event(), threading.Event(), StateFiles.write
 
     def slow_once(self, name, data):
-        if not begun.is_set():
-            begun.set()
+        if not started.is_set():
+            started.set()
             assert free.wait(60)
         return write(self, name, data)
 
@@ -410,7 +410,7 @@ def test_the_last_lot_is_what_the_file_has_also_where_the_disk_outlasts_the_orde
     async def scenario():
         manager = lot_manager(tmp_path)
         first = asyncio.create_task(manager.set_lot("A"))
-        assert await asyncio.to_thread(begun.wait, 60)
+        assert await asyncio.to_thread(started.wait, 60)
         first.cancel()
         await asyncio.gather(first, return_exceptions=True)
         second = asyncio.create_task(manager.set_lot("B"))
@@ -440,7 +440,7 @@ def lot_manager(home):
 
 
 async def cleared(cell, kind):
-    """Say after a start, as a person does on a bench, that the jaws are clear; the recipe is that of before."""
+    """Confirm after a start, as a person does on a bench, that the jaws are clear; the recipe is that of before."""
     cell.twin.world.remove()
     await cell.until(lambda: cell.phase in {State.UNKNOWN, State.HELD, State.IDLE})
     done = await cell.line.order(CommandName.RESET)
@@ -450,10 +450,10 @@ async def cleared(cell, kind):
 
 async def inspected(cell, trigger_id):
     """One fruit for which the PLC names no lot; its trigger as the records have it."""
-    begun = await begin(cell, trigger_id, "")
-    assert begun.refusal is None, await cell.line.state()
-    await cell.line.publish(await cell.line.outcome(begun.sequence))
-    return read_record(cell.station.service.registry.records, begun.sequence).trigger
+    reply = await begin(cell, trigger_id, "")
+    assert reply.refusal is None, await cell.line.state()
+    await cell.line.publish(await cell.line.outcome(reply.sequence))
+    return read_record(cell.station.service.registry.records, reply.sequence).trigger
 
 
 async def at_panel(cell, request, reply):

@@ -51,7 +51,7 @@ def test_a_reset_while_the_ball_is_pressed_is_refused_and_moves_nothing(at_ball)
 
 @pytest.mark.timeout(500)
 def test_a_link_that_returns_during_a_run_moves_nothing_before_a_person_resets(at_ball):
-    """The run was begun without a *Stop*."""
+    """The run was started without a *Stop*."""
 
     async def scenario():
         async with at_ball(bench=False) as (cell, panel, entered):
@@ -122,11 +122,11 @@ def test_no_run_begins_while_the_fingers_are_moved_by_hand(at_ball):
 
 @pytest.mark.timeout(240)
 def test_a_reset_that_waited_for_the_disk_while_a_run_began_moves_nothing(at_ball, monkeypatch):
-    begun, written = threading.Event(), threading.Event()
+    started, written = threading.Event(), threading.Event()
     write = StateFiles.write
 
     def slow(self, name, data):
-        begun.set()
+        started.set()
         assert written.wait(60)
         return write(self, name, data)
 
@@ -135,7 +135,7 @@ def test_a_reset_that_waited_for_the_disk_while_a_run_began_moves_nothing(at_bal
             await stop(panel)
             monkeypatch.setattr(StateFiles, "write", slow)
             starting = asyncio.create_task(give(panel, OperatorCommandName.START))
-            await cell.until(begun.is_set)
+            await cell.until(started.is_set)
             await start_run(panel)
             written.set()
             assert (await starting).why == UNDER_WAY(activity=A_CALIBRATION())

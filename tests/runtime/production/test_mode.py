@@ -81,12 +81,12 @@ def test_a_mode_that_nobody_can_read_is_manual(bench, settings_file, tmp_path, s
 
 @pytest.mark.timeout(240)
 def test_the_last_mode_is_what_the_file_has_also_where_the_disk_outlasts_the_order_before(bench, monkeypatch):
-    begun, free, ended, write = threading.Event(), threading.Event(), threading.Event(), StateFiles.write
+    started, free, ended, write = threading.Event(), threading.Event(), threading.Event(), StateFiles.write
 
     def slow_once(self, name, data):
-        if name != "mode" or begun.is_set():
+        if name != "mode" or started.is_set():
             return write(self, name, data)
-        begun.set()
+        started.set()
         assert free.wait(60)
         written = write(self, name, data)
         ended.set()
@@ -99,7 +99,7 @@ def test_the_last_mode_is_what_the_file_has_also_where_the_disk_outlasts_the_ord
             monkeypatch.setattr(StateFiles, "write", slow_once)
             monkeypatch.setattr(plc_commands, "DEADLINE_S", 0.3)
             assert not (await cell.line.order(CommandName.SET_MODE, PRODUCTION)).done
-            assert begun.is_set()
+            assert started.is_set()
             monkeypatch.setattr(plc_commands, "DEADLINE_S", 25.0)
             manual = asyncio.create_task(cell.line.order(CommandName.SET_MODE, MANUAL))
             await cell.until(lambda: not cell.station.service._in_production)

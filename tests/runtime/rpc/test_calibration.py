@@ -1,4 +1,4 @@
-"""A calibration at the panel: what the page says of it and what is in force agree, whatever the disk does meanwhile."""
+"""A calibration at the panel: what the page reports of it and what is in force agree, also with a slow disk."""
 
 import asyncio
 import errno
@@ -26,11 +26,11 @@ def stored(cell):
 
 @pytest.mark.timeout(400)
 def test_a_calibration_that_the_disk_delays_is_not_called_failed_nor_called_off(at_ball, monkeypatch):
-    begun, called_off = threading.Event(), threading.Event()
+    started, called_off = threading.Event(), threading.Event()
     put_in_force, close = Prepared.put_in_force, PanelCalibration.close
 
     def slow(self):
-        begun.set()
+        started.set()
         assert called_off.wait(60)
         time.sleep(1.5 * DEADLINE_S)
         return put_in_force(self)
@@ -45,7 +45,7 @@ def test_a_calibration_that_the_disk_delays_is_not_called_failed_nor_called_off(
     async def scenario():
         async with at_ball() as (cell, panel, _):
             await start_run(panel, ())
-            await cell.until(begun.is_set, PRESSED_S)
+            await cell.until(started.is_set, PRESSED_S)
             ended = await end_run(panel)
             assert ended.state == "passed", ended
             calibration, audited = stored(cell)

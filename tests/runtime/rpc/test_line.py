@@ -32,22 +32,22 @@ def test_the_life_of_triggers_and_commands(bench):
             assert ready.recipe_checksum > 0
             assert ready.simulated
 
-            begun = await line.begin(10)
+            reply = await line.begin(10)
             doubled, other = await asyncio.gather(line.begin(10), line.begin(11))
             assert [doubled.refusal, other.refusal] == [Refusal.BUSY, Refusal.BUSY]
-            assert (await line.open()).running == (begun.sequence, 10)
+            assert (await line.open()).running == (reply.sequence, 10)
             changing = asyncio.create_task(line.order(CommandName.CHANGE_RECIPE, 3))
-            outcome = await line.outcome(begun.sequence)
+            outcome = await line.outcome(reply.sequence)
             assert outcome.trigger_id == 10
             assert outcome.recipe_number == 2, "the recipe is frozen at the trigger"
             assert outcome.recipe_checksum == ready.recipe_checksum
-            assert outcome == await line.outcome(begun.sequence)
-            assert [held.sequence for held in (await line.open()).outcomes] == [begun.sequence]
+            assert outcome == await line.outcome(reply.sequence)
+            assert [held.sequence for held in (await line.open()).outcomes] == [reply.sequence]
             assert (await changing).done
             assert (await line.ready()).recipe_number == 3
 
             again = await line.begin(10)
-            assert again.sequence == begun.sequence + 1, "the same id is another fruit, its outcome told or not"
+            assert again.sequence == reply.sequence + 1, "the same id is another fruit, its outcome published or not"
             await line.publish(outcome)
             await line.publish(outcome)
             assert (await line.open()).outcomes == ()
@@ -83,17 +83,17 @@ def test_a_fruit_that_was_given_another_outcome_is_not_pressed_on(bench):
             line = cell.line
             await cell.choose("blueberry")
             await line.ready()
-            begun = await line.begin()
+            reply = await line.begin()
             await cell.reach(State.CLOSING_TO_ONSET)
             judged = []
-            cell.at(State.JUDGING, lambda: judged.append(begun.sequence))
-            told = Outcome(
-                sequence=begun.sequence, trigger_id=1, outcome="NO_RESULT", reasons=(Reason.STATION_LOST,),
+            cell.at(State.JUDGING, lambda: judged.append(reply.sequence))
+            lost = Outcome(
+                sequence=reply.sequence, trigger_id=1, outcome="NO_RESULT", reasons=(Reason.STATION_LOST,),
                 late=False, partial=True, simulated=True, area_mm2=None, area_px=None, closing_mm=None, confidence=None,
                 recipe_number=2, recipe_checksum=0, began_utc_ms=0, ended_utc_ms=0, duration_ms=0, encoder=0, lot="",
             )  # fmt: skip
-            await line.publish(told)
-            assert (await line.outcome(begun.sequence)).reasons[0] is Reason.STATION_LOST
+            await line.publish(lost)
+            assert (await line.outcome(reply.sequence)).reasons[0] is Reason.STATION_LOST
             await line.ready()
             assert judged == []
 
@@ -152,9 +152,9 @@ def test_the_longest_deadline_that_a_site_may_set_is_told_with_the_answer(bench)
         async with bench(inspection_deadline_s=LONGEST_S) as cell:
             await cell.choose("blueberry")
             await cell.line.ready()
-            begun = await cell.line.begin()
-            await cell.line.publish(await cell.line.outcome(begun.sequence))
-            return begun
+            reply = await cell.line.begin()
+            await cell.line.publish(await cell.line.outcome(reply.sequence))
+            return reply
 
     assert asyncio.run(scenario()).deadline_s == LONGEST_S + pacing.RECORD_NO_RESULT_S
 
@@ -198,20 +198,20 @@ def test_an_order_to_end_gives_the_outcome_first_and_opens_the_jaws(bench):
         async with bench() as cell:
             await cell.choose("blueberry")
             await cell.line.ready()
-            begun = await cell.line.begin()
+            reply = await cell.line.begin()
             await cell.reach(State.MOVING)
-            asked = asyncio.create_task(cell.line.outcome(begun.sequence))
+            awaited = asyncio.create_task(cell.line.outcome(reply.sequence))
             await asyncio.sleep(0)
             cell.station.stop()
             cell.station.stop()
-            told = set()
-            while not asked.done():
-                told.add((await cell.line.state()).packml_state)
-            told.add((await cell.line.state()).packml_state)
+            states = set()
+            while not awaited.done():
+                states.add((await cell.line.state()).packml_state)
+            states.add((await cell.line.state()).packml_state)
             await cell.running
-            return asked.result(), told, cell.twin.world.opening_mm()
+            return awaited.result(), states, cell.twin.world.opening_mm()
 
-    outcome, told, opening_mm = asyncio.run(scenario())
-    assert told - {PackmlState.EXECUTE} == {PackmlState.STOPPING}
+    outcome, states, opening_mm = asyncio.run(scenario())
+    assert states - {PackmlState.EXECUTE} == {PackmlState.STOPPING}
     assert (outcome.outcome, outcome.reasons[0]) == ("NO_RESULT", Reason.CALLED_OFF)
     assert opening_mm == pytest.approx(85, abs=1)

@@ -1,4 +1,4 @@
-"""The newest lines of the station's log, as the page Maintenance asks for them."""
+"""The newest lines of the station's log, as the page Maintenance requests them."""
 
 import logging
 

@@ -1,4 +1,4 @@
-"""The counts of a lot on the page Run are the records', whatever was inspected since its last fruit."""
+"""The counts of a lot on the page Run are the records', also after other fruit since its last one."""
 
 import asyncio
 import threading
@@ -55,9 +55,9 @@ def test_a_lot_that_returns_after_a_start_is_counted_with_all_its_fruit(bench, s
             configuration = cell.configuration
             await cell.choose("blueberry")
             await cell.line.ready()
-            begun = await cell.line.client.request(Begin(trigger_id=900, encoder=7, lot="X"), BeginReply, deadline_s=20)
-            assert begun.refusal is None
-            await cell.line.publish(await cell.line.outcome(begun.sequence))
+            reply = await cell.line.client.request(Begin(trigger_id=900, encoder=7, lot="X"), BeginReply, deadline_s=20)
+            assert reply.refusal is None
+            await cell.line.publish(await cell.line.outcome(reply.sequence))
             async with ChannelClient(panel_endpoint(configuration.hmi, configuration.home), "the station") as panel:
 
                 async def counted():

@@ -21,7 +21,7 @@ RECIPE = 3
 
 
 def outcome(sequence: int, trigger_id: int, name: str = "PASS", *reasons: Reason) -> Outcome:
-    """As a station judges it; the area tells sequences apart."""
+    """As a station judges it; each sequence has its own area."""
     return Outcome(
         sequence=sequence,
         trigger_id=trigger_id,
@@ -50,12 +50,12 @@ class Inspection:
 
     trigger_id: int
     judged: Outcome | None = None
-    told: Outcome | None = None
+    published: Outcome | None = None
     acknowledged: bool = False
 
     @property
-    def stands(self) -> Outcome | None:
-        return self.told or self.judged
+    def standing(self) -> Outcome | None:
+        return self.published or self.judged
 
 
 @dataclass
@@ -116,16 +116,18 @@ class Station:
         record.judged = outcome(self.running, record.trigger_id, name, *reasons)
         self.running = None
 
-    def publish(self, told: Outcome) -> None:
-        record = self.records[told.sequence]
-        record.told = told
-        if self.running == told.sequence:
+    def publish(self, published: Outcome) -> None:
+        record = self.records[published.sequence]
+        record.published = published
+        if self.running == published.sequence:
             self.running = None
 
     def open(self) -> Open:
         running = None if self.running is None else (self.running, self.records[self.running].trigger_id)
         ended = [
-            record.stands for record in self.records.values() if not record.acknowledged and record.stands is not None
+            record.standing
+            for record in self.records.values()
+            if not record.acknowledged and record.standing is not None
         ]
         return Open(running=running, outcomes=tuple(ended))
 
@@ -165,7 +167,7 @@ class Laws:
         self._counters(before, after)
 
     def _link(self, event: ev.Event, before: State, after: State, actions: Any, *, silent: bool) -> None:
-        asks = [action for action in actions if isinstance(action, do.RequestOpen)]
+        open_requests = [action for action in actions if isinstance(action, do.RequestOpen)]
         up = before.link is Link.UP and not silent
         beats = False
         if isinstance(event, ev.Beat):
@@ -174,29 +176,31 @@ class Laws:
             self.boot, self.boots = event.station.boot, self.boots + new
             beats = up and not new
             if new:
-                assert asks, "a new start of the station is not asked what is open"
+                assert open_requests, "no request for what is open after a new start of the station"
                 assert after.link is Link.RESUMING
             elif not up:
-                assert after.open_request is not None, "a station that is heard again is not asked what is open"
-                assert not asks or silent or before.open_request is None, "it is asked twice at once"
+                assert after.open_request is not None, "no request for what is open to a station that is heard again"
+                assert not open_requests or silent or before.open_request is None, "two requests at once"
         elif silent:
             assert (after.link, after.open_request) == (Link.LOST, None)
         elif isinstance(event, ev.RequestFailed):
             assert after.link is not Link.UP
-            assert after.open_request is None, "a question that failed is not asked anew"
+            assert after.open_request is None, "a failed request is repeated"
         elif isinstance(event, ev.OpenAnswered) and event.number == before.open_request:
             assert (after.link, after.open_request) == (Link.UP, None)
         elif isinstance(event, ev.BeginAnswered) and before.pending and before.pending.number == event.number:
-            assert asks or not up or event.begun.refusal is not Refusal.BUSY, "what keeps the station busy is not asked"
+            assert open_requests or not up or event.begun.refusal is not Refusal.BUSY, "no request for what is open"
         seen = view(after)
         assert seen["station_heartbeat"] == (before.heartbeat + beats) % 2**16
         assert seen["station_boots"] == self.boots
         assert seen["active_recipe"] == (0 if self.heard_s is None else RECIPE), "a lost station's words are used"
 
     def _commands(self, event: ev.Event, before: State, after: State, actions: Any, *, silent: bool) -> None:
-        asks = any(isinstance(action, do.RequestCommand) for action in actions)
-        assert asks == (after.command_request not in {before.command_request, None}), "a command is not carried out"
-        assert asks or after.command is before.command or after.command is not Command.EXECUTING
+        is_requested = any(isinstance(action, do.RequestCommand) for action in actions)
+        assert is_requested == (after.command_request not in {before.command_request, None}), (
+            "a command is not carried out"
+        )
+        assert is_requested or after.command is before.command or after.command is not Command.EXECUTING
         result = after.journal.command_result
         mine = before.command_request is not None
         if before.command is Command.EXECUTING and (
@@ -209,7 +213,7 @@ class Laws:
         elif isinstance(event, ev.CommandFailed) and mine and event.number == before.command_request:
             assert (after.command, result) == (Command.FAILED, COMMAND_RESULT.code("timed_out"))
         elif self._rises(event, before, "execute_command"):
-            self._command_given(event.inputs, before, after)  # pyrefly: ignore[missing-attribute] (`_rises` has looked)
+            self._command_given(event.inputs, before, after)  # pyrefly: ignore[missing-attribute] (`_rises` checks)
 
     def _command_given(self, inputs: ev.Inputs, before: State, after: State) -> None:
         journal = before.journal
@@ -228,11 +232,11 @@ class Laws:
             assert after.command is (Command.EXECUTING if name == "executing" else Command.FAILED)
 
     def _enable(self, event: ev.Event, before: State, after: State, actions: Any) -> None:
-        quiet = (
+        plc_silent = (
             self.plc_beat_s is not None
             and event.at.s >= self.plc_beat_s + self.settings.plc_heartbeat_timeout_s
         )  # fmt: skip
-        if quiet:
+        if plc_silent:
             self.plc_beat_s = None
             assert Fault.PLC_SILENT in after.faults or self._cleared(actions)
             assert after.arming is not Arming.ARMED or isinstance(event, ev.PlcWrote)
@@ -240,7 +244,7 @@ class Laws:
             self.plc_beat_s = self.plc_beat = None
             assert after.arming is not Arming.ARMED
             assert after.counters["count_communication"] > before.counters["count_communication"]
-            assert before.arming is not Arming.ARMED or quiet or Fault.WRITER_LOST in after.faults
+            assert before.arming is not Arming.ARMED or plc_silent or Fault.WRITER_LOST in after.faults
         elif isinstance(event, ev.PlcWrote):
             if "plc_heartbeat" in event.written:
                 if self.plc_beat not in {None, event.inputs.plc_heartbeat}:
@@ -260,8 +264,8 @@ class Laws:
             if began_s is not None and now_s >= began_s + self.settings.handshake_timeout_s:
                 del self.since_s[name]
                 forgotten = bit in (before.seen or ())
-                assert not forgotten or fault in after.faults or self._cleared(actions), f"{fault.name} is not told"
-                assert not shown or self._rises(event, before, bit), f"{name} stands on"
+                assert not forgotten or fault in after.faults or self._cleared(actions), f"{fault.name} is not reported"
+                assert not shown or self._rises(event, before, bit), f"{name} stays on"
             if not shown:
                 self.since_s.pop(name, None)
             elif name not in self.since_s or self._rises(event, before, bit):
@@ -270,7 +274,7 @@ class Laws:
     def _acknowledgement(self, event: ev.Event, before: State, after: State, *, due: bool) -> None:
         now_s = event.at.s
         if isinstance(event, ev.PlcWrote) and "control" in event.written:
-            assert after.result is not Result.WITHHELD, "the PLC has said what it has taken"
+            assert after.result is not Result.WITHHELD, "the PLC has written what it has taken"
         if after.queue and after.result not in {Result.PUBLISHED, Result.WITHHELD}:
             assert now_s < self.since_s.setdefault("waiting", now_s) + self.settings.handshake_timeout_s
         else:
@@ -284,7 +288,7 @@ class Laws:
         ):
             assert after.toggle != before.toggle
         if self._rises(event, before, "acknowledge") and before.seen is not None:
-            sequence = event.inputs.acknowledged_sequence  # pyrefly: ignore[missing-attribute] (`_rises` has looked)
+            sequence = event.inputs.acknowledged_sequence  # pyrefly: ignore[missing-attribute] (`_rises` checks)
             shown = before.queue[0].sequence if before.queue else 0
             if sequence not in {shown, before.unconfirmed}:
                 assert Fault.WRONG_ACKNOWLEDGEMENT in after.faults
@@ -299,7 +303,7 @@ class Laws:
         if after.running is not None or reports is PackmlState.EXECUTE or lost:
             assert now, "the fruit may be moved while the station may be at it"
         elif reports is not PackmlState.IDLE:
-            assert now or not before.acquiring, "the fruit may be moved, and no beat has said so"
+            assert now or not before.acquiring, "the fruit may be moved, and no beat has reported so"
 
     def _counters(self, before: State, after: State) -> None:
         counters = after.counters

@@ -1,6 +1,6 @@
 """PLC, wire, interface and station played at random: messages lost, doubled, late and reordered, either side restarted.
 
-Whatever happens: exactly one outcome for each accepted trigger, never a wrong id, never two different outcomes under
+Always: exactly one outcome for each accepted trigger, never a wrong id, never two different outcomes under
 one sequence, and nothing valid that the station did not judge.
 """
 
@@ -45,7 +45,7 @@ class Request:
 
 @dataclass(frozen=True)
 class AcknowledgementNoted:
-    """The station's answer to `NotifyAcknowledged`, of which the core is not told."""
+    """The station's answer to `NotifyAcknowledged`, which the core does not receive."""
 
     at: ev.Moment
     sequence: int
@@ -68,7 +68,7 @@ class Handshake(RuleBasedStateMachine):
         self.inputs = ev.Inputs()
         self.next_id = 1
         self.refused: set[Any] = set()
-        self.asked_again: set[Any] = set()
+        self.triggered_again: set[Any] = set()
         """Accepted ids that the PLC gave again: after a start that trigger may be refused as `station_lost`."""
         self.missed: tuple[Any, ...] = ()
         self.shown: dict[int, dict[str, Any]] = {}
@@ -86,7 +86,7 @@ class Handshake(RuleBasedStateMachine):
         self.to_station: list[Request] = []
         self.answers: list[ev.Event | AcknowledgementNoted] = []
         self.pending: list[Request] = []
-        self.tells: list[Any] = []
+        self.notes: list[Any] = []
         self.state: State = restarted(self.disk, self.at(), SETTINGS.station_lost_after_s)
         self.laws = self.make_laws(SETTINGS)
         self.seen = view(self.state)
@@ -130,18 +130,18 @@ class Handshake(RuleBasedStateMachine):
                 self.commands.add(self.state.journal.command_sequence)
                 self.send(action, 2.0)
             case do.NotifyPublished() | do.NotifyAcknowledged():
-                self.tells.append(action)
-                self.next_tell()
+                self.notes.append(action)
+                self.send_next_note()
 
     def send(self, action: Any, within_s: float) -> None:
         request = Request(action, self.now_s + within_s)
         self.to_station.append(request)
         self.pending.append(request)
 
-    def next_tell(self) -> None:
-        telling = any(isinstance(r.action, do.NotifyPublished | do.NotifyAcknowledged) for r in self.pending)
-        if self.tells and not telling:
-            self.send(self.tells.pop(0), 1.0)
+    def send_next_note(self) -> None:
+        is_sending = any(isinstance(r.action, do.NotifyPublished | do.NotifyAcknowledged) for r in self.pending)
+        if self.notes and not is_sending:
+            self.send(self.notes.pop(0), 1.0)
 
     def failed(self, request: Request) -> None:
         match request.action:
@@ -150,7 +150,7 @@ class Handshake(RuleBasedStateMachine):
             case do.RequestCommand(number=number):
                 self.feed(ev.CommandFailed(self.at(), number))
             case do.NotifyPublished() | do.NotifyAcknowledged():
-                self.tells.clear()
+                self.notes.clear()
                 self.feed(ev.RequestFailed(self.at(), "a note"))
             case do.RequestOutcome(sequence=sequence):
                 self.feed(ev.OutcomeFailed(self.at(), sequence, "no answer"))
@@ -158,7 +158,7 @@ class Handshake(RuleBasedStateMachine):
                 self.feed(ev.RequestFailed(self.at(), "a question"))
 
     def deliver(self, event: ev.Event | AcknowledgementNoted) -> None:
-        """An answer reaches the core, with the time at which it does; also one that nobody waits for any more."""
+        """An answer reaches the core, with the time at which it does; also one that is not waited for any more."""
         if isinstance(event, AcknowledgementNoted):
             sequence = event.sequence
             self.settle(lambda a: isinstance(a, do.NotifyAcknowledged) and a.sequence == sequence)
@@ -169,14 +169,14 @@ class Handshake(RuleBasedStateMachine):
                 self.settle(lambda a: isinstance(a, do.RequestBegin) and a.number == number)
             case ev.OpenAnswered(number=number):
                 self.settle(lambda a: isinstance(a, do.RequestOpen) and a.number == number)
-            case ev.OutcomeReceived(outcome=told):
-                self.settle(lambda a: isinstance(a, do.RequestOutcome) and a.sequence == told.sequence)
+            case ev.OutcomeReceived(outcome=received):
+                self.settle(lambda a: isinstance(a, do.RequestOutcome) and a.sequence == received.sequence)
             case ev.CommandAnswered(number=number):
                 self.settle(lambda a: isinstance(a, do.RequestCommand) and a.number == number)
             case ev.OutcomeNoted(sequence=sequence):
                 self.settle(lambda a: isinstance(a, do.NotifyPublished) and a.outcome.sequence == sequence)
         self.feed(event)
-        self.next_tell()
+        self.send_next_note()
 
     def settle(self, is_it: Any) -> None:
         self.pending = [request for request in self.pending if not is_it(request.action)]
@@ -192,27 +192,27 @@ class Handshake(RuleBasedStateMachine):
                 self.answers.append(ev.BeginAnswered(at, number, station.begin(trigger_id)))
             case do.RequestOutcome(sequence=sequence):
                 station.waiting.add(sequence)
-                self.tell_outcomes()
+                self.send_outcomes()
             case do.RequestCommand(number=number, argument=argument):
                 self.answers.append(ev.CommandAnswered(at, number, done=argument % 2 == 0, why="no"))
             case do.RequestOpen(number=number):
                 self.answers.append(ev.OpenAnswered(at, number, station.open()))
-            case do.NotifyPublished(outcome=told):
-                station.publish(told)
-                self.answers.append(ev.OutcomeNoted(at, told.sequence))
+            case do.NotifyPublished(outcome=published):
+                station.publish(published)
+                self.answers.append(ev.OutcomeNoted(at, published.sequence))
             case do.NotifyAcknowledged(sequence=sequence):
                 for number, record in station.records.items():
                     record.acknowledged |= number <= sequence
                 self.answers.append(AcknowledgementNoted(at, sequence))
 
-    def tell_outcomes(self) -> None:
+    def send_outcomes(self) -> None:
         for sequence in sorted(self.station.waiting):
             record = self.station.records[sequence]
-            if record.judged is not None or record.told is not None:
-                stands = record.judged or record.told
-                assert stands is not None
+            if record.judged is not None or record.published is not None:
+                standing = record.judged or record.published
+                assert standing is not None
                 self.station.waiting.discard(sequence)
-                self.answers.append(ev.OutcomeReceived(self.at(), stands))
+                self.answers.append(ev.OutcomeReceived(self.at(), standing))
 
     # what the PLC sees
 
@@ -227,15 +227,15 @@ class Handshake(RuleBasedStateMachine):
         assert isinstance(accepted, int)
         if accepted:
             self.accepted.add(accepted)
-            self.refused.discard(accepted)  # a PLC may ask again for what was refused
+            self.refused.discard(accepted)  # a PLC may give a refused trigger again
         missed = (seen["interface_boots"], seen["counters_epoch"], seen["count_missed"])
         if missed != self.missed and self.bit("missed"):
             self.missed = missed
             if seen["last_refusal"] != BY_NAME["last_refusal"].code("bad_trigger_id"):
                 refused = seen["last_refused_trigger_id"]
                 lost = seen["last_refusal"] == BY_NAME["last_refusal"].code("station_lost")
-                if not (lost and refused in self.asked_again):
-                    assert refused not in self.accepted, "a trigger that was accepted is told as refused"
+                if not (lost and refused in self.triggered_again):
+                    assert refused not in self.accepted, "a trigger that was accepted is reported as refused"
                     self.refused.add(refused)
         if not self.bit("result_valid"):
             assert seen["result_sequence"] == seen["result_outcome"] == 0
@@ -307,7 +307,7 @@ class Handshake(RuleBasedStateMachine):
     def trigger_again_with_the_same_id(self) -> None:
         self.write(control=self.control - {"trigger"})
         trigger_id = self.seen["accepted_trigger_id"]
-        self.asked_again.add(trigger_id)
+        self.triggered_again.add(trigger_id)
         self.write(control=self.control | {"trigger"}, trigger_id=trigger_id)
 
     @rule()
@@ -339,7 +339,7 @@ class Handshake(RuleBasedStateMachine):
             self.write(acknowledged_sequence=sequence)
 
     def may_have_been_taken(self, sequence: int) -> bool:
-        """Of what a start finds open only the PLC's first write says whether it was taken before: that is believed.
+        """Of what a start finds open only the PLC's first write shows if it was taken before: that is believed.
 
         A loss of power may have taken the outcome from the journal, or the acknowledgement.
         """
@@ -482,7 +482,7 @@ class Handshake(RuleBasedStateMachine):
     def station_judges(self, name: str) -> None:
         if self.station.up and self.station.running is not None:
             self.station.judge(name)
-            self.tell_outcomes()
+            self.send_outcomes()
 
     @rule()
     def jaws_open(self) -> None:
@@ -500,7 +500,7 @@ class Handshake(RuleBasedStateMachine):
                 if request in self.pending:
                     self.pending.remove(request)
                     self.failed(request)
-                    self.next_tell()
+                    self.send_next_note()
 
     @rule()
     def beat(self) -> None:
@@ -508,7 +508,7 @@ class Handshake(RuleBasedStateMachine):
             self.feed(ev.Beat(self.at(), self.station.state()))
 
     @rule(ready=st.booleans())
-    def output_told(self, ready: bool) -> None:
+    def output_changed(self, ready: bool) -> None:
         self.feed(ev.OutputChanged(self.at(), ready))
 
     @rule()
@@ -528,8 +528,8 @@ class Handshake(RuleBasedStateMachine):
         self.interface_restarts()
 
     @rule(passed_s=st.sampled_from([0.0, 0.45, 1.1]), interface=st.booleans())
-    def begun_is_lost(self, passed_s: float, interface: bool) -> None:
-        """The station has begun; its answer never comes."""
+    def begin_reply_is_lost(self, passed_s: float, interface: bool) -> None:
+        """The station has accepted a trigger; its answer never comes."""
         self.heal()
         self.trigger(armed=True, link=True)
         while self.to_station:
@@ -541,7 +541,7 @@ class Handshake(RuleBasedStateMachine):
 
     @rule()
     def begins_late(self) -> None:
-        """The station carries out a trigger whose answer is not waited for any more, after it said that it is idle."""
+        """The station carries out a trigger whose answer is not waited for any more, after it reported idle."""
         self.heal()
         self.trigger(armed=True, link=True)
         late = [request for request in self.to_station if isinstance(request.action, do.RequestBegin)]
@@ -586,16 +586,16 @@ class Handshake(RuleBasedStateMachine):
         """The station answers, the wire works, and time passes until the link is up."""
         if not self.station.up:
             self.station.restart()
-        self.output_told(ready=True)
+        self.output_changed(ready=True)
         for _ in range(200):
             self.time_passes(0.1, beats=True)
             self.everything_arrives()
-            if self.state.link is Link.UP and not self.pending_tells():
+            if self.state.link is Link.UP and not self.has_pending_notes():
                 return
         raise AssertionError("the interface and the station do not settle")
 
-    def pending_tells(self) -> bool:
-        return bool(self.tells or self.state.journal.verdicts)
+    def has_pending_notes(self) -> bool:
+        return bool(self.notes or self.state.journal.verdicts)
 
     def teardown(self) -> None:
         """In the end everything that was accepted has been shown once, and the station knows what was shown."""
@@ -620,8 +620,8 @@ class Handshake(RuleBasedStateMachine):
         for sequence, block in self.shown.items():
             record = self.station.records[sequence]
             assert record.acknowledged
-            assert record.stands is not None
-            assert block["result_outcome"] == BY_NAME["result_outcome"].code(record.stands.outcome)
+            assert record.standing is not None
+            assert block["result_outcome"] == BY_NAME["result_outcome"].code(record.standing.outcome)
         assert all(record.acknowledged for record in self.station.records.values())
         self.jaws_open()
         self.beat()

@@ -1,4 +1,4 @@
-"""From an open bus to two operational nodes, and what is said where it does not get there."""
+"""From an open bus to two operational nodes, and what is reported where it does not get there."""
 
 import pytest
 from canopen.objectdictionary import eds
@@ -31,7 +31,7 @@ def test_the_nodes_are_configured_and_operational(on_bus):
 
 
 @pytest.mark.parametrize(
-    ("fault", "said"),
+    ("fault", "message"),
     [
         ("wrong_identity", messages.ANOTHER_DEVICE),
         ("mapping_changed", messages.ANOTHER_MAPPING),
@@ -40,12 +40,12 @@ def test_the_nodes_are_configured_and_operational(on_bus):
         ("encoder_silent", messages.NO_HEARTBEAT),
     ],
 )
-def test_a_node_that_is_not_right_is_named_and_taken_once_it_is(on_bus, fault, said):
+def test_a_node_that_is_not_right_is_named_and_taken_once_it_is(on_bus, fault, message):
     async def scenario(rig):
         rig.faults.set(fault)
         rig.io.renew_health(40)
         node = messages.ENCODER(node=17) if fault == "encoder_silent" else messages.GATE(node=16)
-        await rig.until(lambda: (rig.io.why_not_ready or messages.COMING_UP()).id == said.id)
+        await rig.until(lambda: (rig.io.why_not_ready or messages.COMING_UP()).id == message.id)
         assert rig.io.why_not_ready.parameters["node"] == node
         assert not rig.io.ready
         assert rig.io.bus_faults == (rig.io.why_not_ready,)

@@ -9,7 +9,7 @@ from station.settings.can import CanSettings
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
+    ("values", "message"),
     [
         ({"gate_node": 17}, "three different node ids"),
         ({"station_node": 16}, "three different node ids"),
@@ -23,8 +23,8 @@ from station.settings.can import CanSettings
         ({"pulse_ms": 256}, "less than or equal to 255"),
     ],
 )
-def test_what_does_not_fit_is_refused(values, said):
-    with pytest.raises(ValidationError, match=re.escape(said)):
+def test_what_does_not_fit_is_refused(values, message):
+    with pytest.raises(ValidationError, match=re.escape(message)):
         CanSettings(**values)
 
 

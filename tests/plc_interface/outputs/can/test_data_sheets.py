@@ -1,4 +1,4 @@
-"""The nodes' data sheets are read by canopen and say what the driver packs."""
+"""The nodes' data sheets are read by canopen and define what the driver packs."""
 
 import configparser
 from typing import Any

@@ -51,7 +51,7 @@ def test_a_shot_beyond_the_wrap_is_ahead(on_bus):
         assert echo.at_count < 500
         assert rig.io.count_at_gate(0xFFFF_FFFF) == rig.settings.distance_counts - 1
 
-    # the belt stands still from the start, so that it is the shot that lies beyond the wrap
+    # the belt does not move from the start, so that it is the shot that is beyond the wrap
     async def whole(rig):
         rig.faults.set("stuck")
         await scenario(rig)

@@ -37,13 +37,13 @@ def console(configuration):
     command = [sys.executable, "-m", "station", "twin", "--bench", "--console", "0", "--config", str(configuration)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
-    said = {}
+    lines = {}
     for line in process.stdout:
-        said[line.split()[0].rstrip(";")] = line
+        lines[line.split()[0].rstrip(";")] = line
         if line.startswith("running"):
             break
-    assert "CAN udp_multicast 239.74.163.2: gate 16, encoder 17" in said["line"]
-    yield int(said["console"].split(":")[1])
+    assert "CAN udp_multicast 239.74.163.2: gate 16, encoder 17" in lines["line"]
+    yield int(lines["console"].split(":")[1])
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=20)
     assert process.returncode == 0

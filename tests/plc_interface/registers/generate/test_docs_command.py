@@ -1,4 +1,4 @@
-"""`station plc docs`, and that what lies in the repository is what it makes."""
+"""`station plc docs`, and that what is in the repository is what it makes."""
 
 import subprocess
 import sys

@@ -92,9 +92,9 @@ class LogixBlock:
             case "if_":
                 *arms, otherwise = node.children
                 for condition, body in zip(arms[::2], arms[1::2], strict=True):
-                    asked = self._value(condition)
-                    assert isinstance(asked, bool), "a condition has to be BOOL"
-                    if asked:
+                    is_true = self._value(condition)
+                    assert isinstance(is_true, bool), "a condition has to be BOOL"
+                    if is_true:
                         self._run(body.children)
                         return
                 self._run(otherwise.children if otherwise is not None else [])
@@ -173,9 +173,9 @@ class LogixBlock:
                 holder, key = self._place(node)
                 return holder[key]
             case "not_":
-                asked = self._value(node.children[0])
-                assert isinstance(asked, bool)
-                return not asked
+                operand = self._value(node.children[0])
+                assert isinstance(operand, bool)
+                return not operand
         left, right = (self._value(child) for child in node.children)
         assert isinstance(left, bool) == isinstance(right, bool), f"{node.data} of BOOL and number"
         done = OPERATIONS[node.data](left, right)

@@ -351,7 +351,7 @@ class Library:
 
 
 class Station:
-    """A station of registers that does what a test tells it: nothing by itself but beat."""
+    """A station of registers that does what a test sets: nothing by itself but beat."""
 
     def __init__(self, order: WordOrder = WordOrder.HIGH_FIRST) -> None:
         self.order = order

@@ -65,7 +65,7 @@ def test_fruits_recipe_refusal_and_a_station_that_dies(serve, make_plc, no_conta
                 assert (block["refused"], block["timed_out"]) == (False, False)
                 assert (block["result"]["trigger_id"], block["result"]["encoder"]) == (fruit, fruit << 16)
                 await loop.until("done", wanted=False, inspect=False)
-            assert [trigger for trigger, _, _ in rig.begun] == [7, 8, 9]
+            assert [trigger for trigger, _, _ in rig.accepted] == [7, 8, 9]
 
             await loop.until("recipe_done", change_recipe=True, recipe_number=12)
             assert rig.commands == [("change_recipe", 12)]

@@ -1,4 +1,4 @@
-"""The function block, run by an evaluator against a station that does what the test says."""
+"""The function block, run by an evaluator against a station that does what the test sets."""
 
 import pytest
 from hypothesis import example, given, settings

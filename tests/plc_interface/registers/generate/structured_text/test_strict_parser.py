@@ -10,7 +10,7 @@ from tree_sitter import Language, Node, Parser
 from plc_interface.registers.generate.structured_text import configuration, data_types, example, function_block
 
 CONTROL_STATEMENTS = {"if_statement", "case_statement", "for_statement"}
-"""The grammar takes them without the semicolon that the standard's statement list asks for, as some vendors do. A
+"""The grammar takes them without the semicolon that the standard's statement list requires, as some vendors do. A
 semicolon after one is an empty statement in its tree."""
 TEXTS = {"data_types": data_types, "function_block": function_block, "example": example, "configuration": configuration}
 

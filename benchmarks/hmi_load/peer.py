@@ -29,8 +29,8 @@ def packages() -> Path:
     folder = Path(sys.prefix) / name
     if not folder.exists():
         with tempfile.TemporaryDirectory(dir=sys.prefix) as made:
-            quiet = ("--quiet", "--disable-pip-version-check", "--require-hashes", "--no-deps")
-            command = [sys.executable, "-m", "pip", "install", *quiet, "--target", f"{made}/{name}", "-r", str(LOCK)]
+            options = ("--quiet", "--disable-pip-version-check", "--require-hashes", "--no-deps")
+            command = [sys.executable, "-m", "pip", "install", *options, "--target", f"{made}/{name}", "-r", str(LOCK)]
             subprocess.run(command, check=True)
             Path(made, name).rename(folder)
     return folder
@@ -55,7 +55,7 @@ def nicegui(configuration: Path) -> Iterator[tuple[psutil.Process, str]]:
         deadline_s = time.monotonic() + START_S
         while not any(each.status == psutil.CONN_LISTEN for each in served.net_connections("inet")):
             if process.poll() is not None or time.monotonic() > deadline_s:
-                raise SystemExit("NiceGUI's page did not start; what it said is above")
+                raise SystemExit("NiceGUI's page did not start; its output is above")
             time.sleep(0.1)
         yield served, f"http://127.0.0.1:{port}"
     finally:

@@ -1,6 +1,6 @@
 """Page Run made with NiceGUI: the peer of the station's own pages, with the same figures, charts and picture.
 
-Run as a program: `nicegui_page.py CONFIGURATION PORT`, with the packages of `nicegui.lock` on the path. It asks the
+Run as a program: `nicegui_page.py CONFIGURATION PORT`, with the packages of `nicegui.lock` on the path. It polls the
 station by the pages' own gateway, as often as the page Run is updated, and draws by the same charts: what differs is
 how elements and their changes come to a browser. NiceGUI's server and settings are its defaults.
 """
@@ -31,10 +31,10 @@ locale = Locale("en")
 
 @app.get("/fruit/{sequence}/picture.jpg")
 async def picture(sequence: int) -> Response:
-    """Send a fruit's picture, which a browser keeps."""
+    """Send a fruit's picture, which a browser caches."""
     found = await gateway.request(GetPicture(sequence=sequence), Picture)
-    kept = {"cache-control": "private, max-age=31536000, immutable"}
-    return Response(base64.b64decode(found.jpeg), media_type="image/jpeg", headers=kept)
+    headers = {"cache-control": "private, max-age=31536000, immutable"}
+    return Response(base64.b64decode(found.jpeg), media_type="image/jpeg", headers=headers)
 
 
 class Page:
@@ -60,7 +60,7 @@ class Page:
         ui.timer(site.hmi.refresh_s, self.fill)
 
     def fill(self) -> None:
-        """Write what the station said last; NiceGUI sends what has changed."""
+        """Write what the station sent last; NiceGUI sends what has changed."""
         state, last = gateway.state, gateway.last
         if state is None:
             return

@@ -1,4 +1,4 @@
-"""The PLC's latency, the cycle's own time and the processor with nobody looking, with panels, readers and browsers.
+"""The PLC's latency, the cycle's own time and the processor with no client, with panels, readers and browsers.
 
 In turn in every round; the last browsers show the same page made with NiceGUI, the peer.
 """
@@ -19,14 +19,14 @@ from bench_plc import Figures, measured
 from playwright.sync_api import Browser
 from prometheus_client.parser import text_string_to_metric_families
 
-NOBODY, PANELS, READERS, BROWSERS, PEER = (
+NO_CLIENT, PANELS, READERS, BROWSERS, PEER = (
     "no client",
     "three panels",
     "ten readers of the history",
     "three browsers on these cores",
     "three browsers, NiceGUI's page",
 )
-LOOKERS, HISTORY_READERS = 3, 10
+PANEL_COUNT, HISTORY_READERS = 3, 10
 OWN_PHASES = ("awaiting_measure", "measuring_last", "judging", "recording_accept", "recording_reject")
 """Of the cycle: what neither moves nor waits for a frame."""
 SCAN_US = 10_000
@@ -74,7 +74,7 @@ def clients(who: str, count: int, host: str, port: int) -> Iterator[None]:
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
     try:
         if process.stdout is None or process.stdout.readline() != "looking\n":
-            raise SystemExit(f"the {who} were told nothing")
+            raise SystemExit(f"the {who} got no pages")
         yield
         if process.poll() is not None:
             raise SystemExit(f"the {who} ended before the round did")
@@ -86,7 +86,7 @@ def clients(who: str, count: int, host: str, port: int) -> Iterator[None]:
 @contextlib.contextmanager
 def browsers(browser: Browser, host: str, port: int) -> Iterator[None]:
     """Browsers with the page Run, on the cores that the station has."""
-    contexts = [browser.new_context() for _ in range(LOOKERS)]
+    contexts = [browser.new_context() for _ in range(PANEL_COUNT)]
     try:
         for context in contexts:
             page = context.new_page()
@@ -137,7 +137,7 @@ def compared(
     return found
 
 
-def asking(program: Path, port: int) -> Callable[[float], Figures]:
+def plc_reader(program: Path, port: int) -> Callable[[float], Figures]:
     """The PLC, which reads once each scan for some seconds."""
     return lambda seconds: measured(program, port, 1, SCAN_US, seconds)
 
@@ -159,7 +159,7 @@ class Difference(NamedTuple):
 def difference(before: list[float], after: list[float]) -> Difference:
     """The paired differences' median, and an interval of theirs that holds the true median with 95 % or more.
 
-    The sign test's: the true median lies between the k-th lowest and the k-th highest of n with the probability
+    The sign test's: the true median is between the k-th lowest and the k-th highest of n with the probability
     1 - 2 P(B < k), B binomial with n and 1/2. Where no k reaches 95 %, their whole range, and what that reaches.
     """
     from scipy.stats import binom  # noqa: PLC0415 (not for the panels' own processes)
@@ -208,29 +208,29 @@ def table(found: dict[str, list[Round]]) -> list[str]:
 
 
 def differences(found: dict[str, list[Round]]) -> list[str]:
-    """Each condition against nobody looking, round by round, the peer against our page, and what follows."""
-    ours = [name for name in found if name not in {NOBODY, PEER}]
+    """Each condition against no client, round by round, the peer against our page, and what follows."""
+    ours = [name for name in found if name not in {NO_CLIENT, PEER}]
     lines = ["| against no client | " + " | ".join(ours) + " |", "|---|" + "---|" * len(ours)]
     sentences = []
-    told = {row: {name: _against(found, name, row) for name in ours} for row in (BOTH, OWN, P50, P99)}
-    for row, each in told.items():
+    by_row = {row: {name: _against(found, name, row) for name in ours} for row in (BOTH, OWN, P50, P99)}
+    for row, each in by_row.items():
         cells = [
             f"{_signed(one.median, row)} ({_signed(one.lowest, row)} to {_signed(one.highest, row)})"
             for one in each.values()
         ]
         lines.append(f"| {row.title}, {row.unit} | {' | '.join(cells)} |")
-    panels_cost = told[BOTH][PANELS]
+    panels_cost = by_row[BOTH][PANELS]
     under = "less" if panels_cost.highest < MOST_PERCENT else "not surely less"
     sentences.append(f"- Three panels cost both processes together {under} than {MOST_PERCENT} % of {CORES} cores.")
     for name in ours:
-        said = [_sentence(row, told[row][name]) for row in (OWN, P50, P99)]
-        sentences.append(f"- {name[0].upper()}{name[1:]}: {'; '.join(said)}.")
+        parts = [_sentence(row, by_row[row][name]) for row in (OWN, P50, P99)]
+        sentences.append(f"- {name[0].upper()}{name[1:]}: {'; '.join(parts)}.")
     more = difference([PAGES.of(each) for each in found[BROWSERS]], [PAGES.of(each) for each in found[PEER]])
     sentences.append(
         f"- NiceGUI's page takes {_signed(more.median, PAGES)} ({_signed(more.lowest, PAGES)} to "
         f"{_signed(more.highest, PAGES)}) {PAGES.unit} against this page, for the same three browsers."
     )
-    confidence = told[P99][PANELS].confidence
+    confidence = by_row[P99][PANELS].confidence
     note = (
         "Median of the rounds' differences, and the interval that holds the true median with "
         f"{100 * confidence:.0f} % (sign test). From it:"
@@ -239,19 +239,19 @@ def differences(found: dict[str, list[Round]]) -> list[str]:
 
 
 def _against(found: dict[str, list[Round]], name: str, row: Row) -> Difference:
-    return difference([row.of(each) for each in found[NOBODY]], [row.of(each) for each in found[name]])
+    return difference([row.of(each) for each in found[NO_CLIENT]], [row.of(each) for each in found[name]])
 
 
 def _signed(value: float, row: Row) -> str:
     return f"{value:+,.{row.digits}f}".replace("-", "\N{MINUS SIGN}")
 
 
-def _sentence(row: Row, told: Difference) -> str:
+def _sentence(row: Row, found: Difference) -> str:
     name = row.title.partition(":")[0] if row is OWN else row.title.rpartition(" ")[2]
-    if not told.beyond_noise:
+    if not found.beyond_noise:
         return f"no difference of {name} beyond noise"
-    more = "more" if told.median > 0 else "less"
-    return f"{name} is {abs(told.median):,.0f} {row.unit} {more}, which is beyond noise"
+    more = "more" if found.median > 0 else "less"
+    return f"{name} is {abs(found.median):,.0f} {row.unit} {more}, which is beyond noise"
 
 
 def conditions_of(rounds: int, seconds: float) -> str:

@@ -42,7 +42,7 @@ def draw(address: str, process: psutil.Process, browser: Browser, console: int) 
     """
     page = browser.new_context().new_page()
     page.goto(f"{address}/people")
-    kept_in_all_sizes(page, "first-start")
+    save_in_all_sizes(page, "first-start")
     page.fill("#pin", PIN)
     page.fill("#again", PIN)
     with page.expect_navigation():
@@ -50,20 +50,20 @@ def draw(address: str, process: psutil.Process, browser: Browser, console: int) 
     with page.expect_navigation():
         page.locator(".who form button").click()
     page.goto(f"{address}/people")
-    kept_in_all_sizes(page, "log-in")
+    save_in_all_sizes(page, "log-in")
     page.locator("input[name=name]").first.check(force=True)
     page.fill("#pin", PIN)
     with page.expect_navigation():
         page.locator(".log-in .main").click()
     page.goto(address)
-    failed = page.locator(".tile-fail").first  # of which every image is kept
+    failed = page.locator(".tile-fail").first  # of which every image is stored
     failed.wait_for(timeout=1000 * FAIL_WITHIN_S)
     inspection = (failed.get_attribute("href") or "").replace("/fruit/", "/history/")
     page.goto(address + inspection)
     step = page.locator(".steps a").last.get_attribute("href") or ""
     for name, path in {**PAGES, "inspection": inspection, "step": step}.items():
         page.goto(address + path)
-        kept_in_all_sizes(page, name)
+        save_in_all_sizes(page, name)
     alarm_drawn(page, address, console)
     page.goto(f"{address}/panel")
     page.set_viewport_size({"width": 1280, "height": 800})
@@ -75,13 +75,13 @@ def draw(address: str, process: psutil.Process, browser: Browser, console: int) 
     page.context.clear_cookies(name=re.compile("^station_panel"))
     page.goto(f"{address}/change")
     page.locator(".fruit-tile:not(.active)").first.click()
-    kept_in_all_sizes(page, "confirm")
+    save_in_all_sizes(page, "confirm")
     page.goto(address)
     settled(page)
     process.suspend()  # the last, as the station raises an alarm of it
     page.locator("body.stale").wait_for()
     page.wait_for_timeout(2500)
-    kept_in_all_sizes(page, "stale")
+    save_in_all_sizes(page, "stale")
     process.resume()
     page.locator("body:not(.stale)").wait_for()
     page.context.close()
@@ -93,17 +93,17 @@ def alarm_drawn(page: Page, address: str, console: int) -> None:
     ask("127.0.0.1", console, {"do": "set", **fault})
     page.goto(f"{address}/alarms")
     page.locator("#alarm-gripper_link_lost").wait_for(timeout=1000 * FAIL_WITHIN_S)
-    kept_in_all_sizes(page, "alarms")
+    save_in_all_sizes(page, "alarms")
     page.locator("#alarm-gripper_link_lost").click()
-    kept_in_all_sizes(page, "alarm")
+    save_in_all_sizes(page, "alarm")
     with page.expect_navigation():
         page.get_by_role("button", name="Acknowledge").first.click()
     ask("127.0.0.1", console, {"do": "clear", **fault})
     page.locator(".alarm").first.wait_for(state="detached", timeout=1000 * FAIL_WITHIN_S)
 
 
-def kept_in_all_sizes(page: Page, name: str) -> None:
-    """At the panel's size and at a phone's."""
+def save_in_all_sizes(page: Page, name: str) -> None:
+    """Save the page at the panel's size and at a phone's."""
     for size, (width, height) in SIZES.items():
         page.set_viewport_size({"width": width, "height": height})
         settled(page)

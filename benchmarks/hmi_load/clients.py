@@ -1,6 +1,6 @@
 """Clients without a browser: panels that show the page Run, or readers that page through the history.
 
-Run as a program: `clients.py HOST PORT COUNT {panels,readers}`; says `looking` once all are answered, and goes on until
+Run as a program: `clients.py HOST PORT COUNT {panels,readers}`; prints `looking` once all have pages, and goes on until
 ended. A panel takes the page's stream and fetches what that page fetches; a reader opens a page a second.
 """
 
@@ -9,7 +9,7 @@ import re
 import sys
 
 PAGE_S = 1.0
-"""How long a reader looks at a page."""
+"""How long a reader reads a page."""
 FRUIT, IMAGE, OLDER = (
     re.compile(rb'"(/history/\d+)"'),
     re.compile(rb"/history/image/\w+\.png"),
@@ -21,7 +21,7 @@ PART, PICTURE = re.compile(rb'data-live="([a-z._]+)"'), re.compile(rb"/fruit/\d+
 async def answered(
     host: str, port: int, path: str, cookie: bytes = b""
 ) -> tuple[asyncio.StreamReader, asyncio.StreamWriter, bytes]:
-    """Ask for something; gives the answer's head, and the connection with its body still to come."""
+    """Send a request; returns the answer's head, and the connection with its body still to come."""
     reader, writer = await asyncio.open_connection(host, port, limit=1 << 20)
     lines = [f"GET {path} HTTP/1.1", f"Host: {host}:{port}", "Accept-Language: en", f"Cookie: {cookie.decode()}"]
     writer.write("\r\n".join([*lines, "Connection: close", "", ""]).encode())
@@ -36,7 +36,7 @@ async def fetched(host: str, port: int, path: str, cookie: bytes = b"") -> tuple
     return head, body
 
 
-async def look(host: str, port: int, looking: asyncio.Event) -> None:
+async def show_panel(host: str, port: int, started: asyncio.Event) -> None:
     """One panel: the page and its picture, then the stream, and the picture of each new fruit."""
     head, page = await fetched(host, port, "/")
     cookie = (re.search(rb"set-cookie: ([^;\r]+)", head, re.IGNORECASE) or [b"", b""])[1]
@@ -49,12 +49,12 @@ async def look(host: str, port: int, looking: asyncio.Event) -> None:
             shown = pictures[-1]
             await fetched(host, port, shown.decode(), cookie)
         if line.startswith(b"data:"):
-            looking.set()
+            started.set()
     writer.close()
     raise ConnectionError("the stream ended")
 
 
-async def page_through(host: str, port: int, looking: asyncio.Event) -> None:
+async def page_through(host: str, port: int, started: asyncio.Event) -> None:
     """One reader: the history page by page, every fruit of a page with its images, from the newest to the oldest."""
     head, _ = await fetched(host, port, "/history")
     cookie = (re.search(rb"set-cookie: ([^;\r]+)", head, re.IGNORECASE) or [b"", b""])[1]
@@ -72,19 +72,19 @@ async def page_through(host: str, port: int, looking: asyncio.Event) -> None:
         for fruit in dict.fromkeys(FRUIT.findall(rows)):
             for image in dict.fromkeys(IMAGE.findall(await page(fruit.decode()))):
                 await fetched(host, port, image.decode(), cookie)
-            looking.set()
+            started.set()
         older = OLDER.search(rows)
         path = f"/history?below={older[1].decode()}" if older else "/history"
 
 
 async def main(host: str, port: int, count: int, who: str) -> None:
-    """Look until ended."""
-    begun = [asyncio.Event() for _ in range(count)]
-    does = {"panels": look, "readers": page_through}[who]
+    """Show or read pages until ended."""
+    started_events = [asyncio.Event() for _ in range(count)]
+    does = {"panels": show_panel, "readers": page_through}[who]
     async with asyncio.TaskGroup() as group:
-        for each in begun:
+        for each in started_events:
             group.create_task(does(host, port, each))
-        for each in begun:
+        for each in started_events:
             await each.wait()
         print("looking", flush=True)
 

@@ -73,7 +73,7 @@ class Story(BaseModel):
         return [*of_fruits, *((0, *each) for each in self.broken)]
 
 
-class Kept(BaseModel):
+class Results(BaseModel):
     """All that was measured."""
 
     model_config = ConfigDict(extra="forbid")
@@ -86,14 +86,14 @@ class Kept(BaseModel):
         return [fruit for story in self.stories for fruit in story.fruits]
 
 
-def read(file: Path) -> Kept:
-    """Read what was kept; nothing where there is no file."""
-    return Kept.model_validate_json(file.read_text(encoding="utf-8")) if file.exists() else Kept()
+def read(file: Path) -> Results:
+    """Read what was stored; nothing where there is no file."""
+    return Results.model_validate_json(file.read_text(encoding="utf-8")) if file.exists() else Results()
 
 
 def write(file: Path, stories: Sequence[Story]) -> None:
-    """Keep stories, in the order of their seeds."""
+    """Store stories, in the order of their seeds."""
     ordered = tuple(sorted(stories, key=lambda story: story.seed))
     new = file.with_suffix(".new")
-    new.write_text(Kept(stories=ordered).model_dump_json(indent=0, exclude_defaults=True) + "\n", encoding="utf-8")
+    new.write_text(Results(stories=ordered).model_dump_json(indent=0, exclude_defaults=True) + "\n", encoding="utf-8")
     new.replace(file)

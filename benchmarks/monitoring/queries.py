@@ -1,4 +1,4 @@
-"""Every question that dashboards and rules ask, with the variables filled in as Grafana does."""
+"""Every query of dashboards and rules, with the variables filled in as Grafana does."""
 
 import json
 import re
@@ -74,20 +74,20 @@ def sql(text: str, begin: str, end: str, zone: str = "UTC", **variables: list[st
 
 
 def unfiltered(expr: str) -> str:
-    """An alert's expression, so that it answers also where nothing is wrong: comparisons tell 0 or 1.
+    """An alert's expression, so that it answers also where nothing is wrong: comparisons return 0 or 1.
 
     Args:
         expr: PromQL without strings or braces beside those of selectors.
     """
-    kept: list[str] = []
+    quoted: list[str] = []
 
     def keep(match: re.Match[str]) -> str:
-        kept.append(match[0])
-        return f"\x00{len(kept) - 1}\x00"
+        quoted.append(match[0])
+        return f"\x00{len(quoted) - 1}\x00"
 
     compared = _COMPARED.sub(r"\1 bool ", _QUOTED.sub(keep, expr))
-    asked = re.sub("\x00(\\d+)\x00", lambda match: kept[int(match[1])], compared)
-    return re.sub(r"^absent\((.*)\)$", r"\1", asked)
+    queries = re.sub("\x00(\\d+)\x00", lambda match: quoted[int(match[1])], compared)
+    return re.sub(r"^absent\((.*)\)$", r"\1", queries)
 
 
 def rules() -> Iterator[tuple[str, str]]:
@@ -103,8 +103,8 @@ def used(names: set[str]) -> set[str]:
     Args:
         names: as they are scraped, with a histogram's `_bucket`, `_sum` or `_count`.
     """
-    asked = " ".join(
+    queries = " ".join(
         [*(expr for _, expr in rules()), *(t.get("expr", "") for panel in panels() for t in panel.targets)]
     )
-    words = set(re.findall(r"[a-zA-Z_:][a-zA-Z0-9_:]*", asked))
+    words = set(re.findall(r"[a-zA-Z_:][a-zA-Z0-9_:]*", queries))
     return names & words
