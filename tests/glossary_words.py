@@ -55,7 +55,7 @@ MEANT: dict[str, tuple[str, ...]] = {
     "look": (
         "docs/alarms.md",  # a person does
     ),
-    "shot": ("station/twin/can/gate.py", "station/twin/can/line.py"),  # `can.shot_deadline_s`
+    "shot": ("station/twin/can/gate.py",),  # `can.shot_deadline_s`
     "sound diverted": ("README.md", "docs/sorting.md", "docs/triggers.md"),  # column headings of a result
     "witness": ("docs/robust-constants.md",),
 }

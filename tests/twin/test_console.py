@@ -42,7 +42,7 @@ def test_faults_are_set_listed_and_cleared():
 
 
 @pytest.mark.parametrize(
-    ("request", "words"),
+    ("order", "words"),
     [
         ({"do": "set", "device": "oven", "fault": "off"}, "there is no device 'oven'; there are: camera"),
         ({"do": "set", "device": "camera", "fault": "hot"}, "camera has no fault 'hot'; it knows: off, stuck"),
@@ -56,10 +56,10 @@ def test_faults_are_set_listed_and_cleared():
         ({"do": "echo"}, "word"),
     ],
 )
-def test_what_is_wrong_is_refused_with_what_there_is(request, words):
+def test_what_is_wrong_is_refused_with_what_there_is(order, words):
     def check(host: str, port: int, board: FaultBoard) -> None:
         with pytest.raises(ConsoleRefusalError, match=words):
-            ask(host, port, request)
+            ask(host, port, order)
         assert board.snapshot() == {}
         assert ask(host, port, {"do": "echo", "word": "still here"}) == "still here"
 

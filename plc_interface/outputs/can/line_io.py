@@ -215,12 +215,17 @@ class LineIo:
     async def _beat(self) -> None:
         """Send the station's heartbeat from this loop: if the loop hangs, the heartbeat stops, as it has to."""
         while True:
-            if self._healthy and self._link:
-                try:
-                    self._link.send(HEARTBEAT + self._settings.station_node, bytes([_OPERATIONAL]))
-                except InterfaceError:
-                    self._counters["send_errors"] += 1
+            if self._link:
+                self._send_beat(self._link)
             await asyncio.sleep(self._settings.heartbeat_s)
+
+    def _send_beat(self, link: CanLink) -> None:
+        if not self._healthy:
+            return
+        try:
+            link.send(HEARTBEAT + self._settings.station_node, bytes([_OPERATIONAL]))
+        except InterfaceError:
+            self._counters["send_errors"] += 1
 
     async def _keep_up(self) -> None:
         pause_s = self._settings.retry_s
@@ -290,6 +295,9 @@ class LineIo:
             await self._order(link, node, "PRE-OPERATIONAL", _PRE_OPERATIONAL)
         await self._in_worker(lambda: bring_up.configure_encoder(encoder, settings))
         await self._in_worker(lambda: bring_up.configure_gate(gate, settings))
+        # From its first heartbeat after that configuration the gate watches the station (CiA 301): at once, so that it
+        # is never operational for a station that has just gone.
+        self._send_beat(link)
         for node in (encoder, gate):
             if standing := await self._in_worker(lambda node=node: bring_up.active_error(node)):
                 self._on_emergency(Emergency(node.number, *standing))

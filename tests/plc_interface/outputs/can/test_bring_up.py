@@ -1,5 +1,7 @@
 """From an open bus to two operational nodes, and what is reported where it does not get there."""
 
+import asyncio
+
 import pytest
 from canopen.objectdictionary import eds
 
@@ -55,6 +57,18 @@ def test_a_node_that_is_not_right_is_named_and_taken_once_it_is(on_bus, fault, m
         assert rig.io.bus_faults == ()
         assert rig.io.counters["bring_up_failures"] >= 1
 
+    on_bus(scenario)
+
+
+def test_an_operational_gate_watches_the_station_also_where_it_goes_before_its_next_heartbeat(on_bus, monkeypatch):
+    async def never(_: LineIo) -> None:
+        await asyncio.Event().wait()
+
+    async def scenario(rig):
+        await rig.ready()
+        await rig.until(lambda: not rig.nodes.gate.operational)
+
+    monkeypatch.setattr(LineIo, "_beat", never)
     on_bus(scenario)
 
 
