@@ -136,7 +136,7 @@ class CalibrationProcedure:
         # Each by itself: the mean of all frames would hide the noise that the few frames of a step have.
         untouched = [(await self._press.measure(replace(taken, frames=(frame,)))).contact for frame in some]
         steps = await self._press_through()
-        # There is one, and a step before it: `_press_through` refuses a press without a contact or with one at first.
+        # There is one, and a step before it: `_press_through` refuses a press that has no contact or starts with one.
         first = next(step for step in steps if step.contact.is_firm)
         before = [step for step in steps if step.width_mm > first.width_mm]
         between = messages.ONSET_BETWEEN(wider_mm=before[-1].width_mm, narrower_mm=first.width_mm)
@@ -206,7 +206,7 @@ class CalibrationProcedure:
         height, width = reference.shape[:2]
         usual = Scale.typical(height, width)
         made = datetime.now(UTC)
-        # Stored before the refusal below, whose evidence has the checks too.
+        # Stored before the refusal below: `evidence` shows the checks of a refused run, too.
         checks = self._checks = tuple(calibration_checks(self._settings, self._recipe, steps, onset_mm, noise, scale))
         calibration = Calibration(
             id=stamp(made),

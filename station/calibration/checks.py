@@ -41,9 +41,9 @@ def calibration_checks(
     shown = {point.width_mm for point in curve}
     touched = [step for step in steps if step.point.width_mm in shown and step.contact.found]
     fall = figures.falls(curve)
-    # Without a contact both are 0, which fails their checks.
+    # Without a step to judge, this and the confidence are 0, which fails their checks.
     round_ = max((figures.roundness(step.contact) for step in touched), default=0.0)
-    # A confidence that the method does not give is no trust, as for the judge.
+    # A confidence that the method does not give counts as 0, as for the judge.
     confidence = min((point.confidence or 0.0 for point in curve), default=0.0)
     checks = [
         Check(
@@ -85,7 +85,7 @@ def calibration_checks(
             name="noise",
             passed=noise.gate_factor <= _MOST_GATE_FACTOR,
             found=messages.GATE_REACHED(value=noise.gate),
-            # The factor's limit as one of the statistic, which is the value found.
+            # The factor's limit, converted to the statistic, which is what was found.
             expected=messages.AT_MOST(value=QUIET_GATE * _MOST_GATE_FACTOR),
             remedy=messages.DO_NOISE(),
         ),
@@ -116,7 +116,7 @@ def verification_checks(
     area = figures.ratio(curve, calibration.curve, "area_px")
     # The widths before the contact have no area, which is no fall; a contact that is lost again is one.
     fall = figures.falls(list(dropwhile(lambda point: not point.area_px, curve)))
-    # No sensor's noise is less than 0.1 grey levels, but a dark colour's may be stored as 0.
+    # A dark colour's noise may be stored as 0: it must not divide by 0.
     noise = max(now / max(was, 0.1) for now, was in zip(pixel_levels, calibration.noise.pixel_levels, strict=True))
     shift_mm = None if onset_mm is None else onset_mm - calibration.onset_mm
     return [

@@ -38,8 +38,8 @@ def pixel_noise(frames: Sequence[Image]) -> np.ndarray:
     Returns:
         Shape (height, width, 3), dtype float32, grey levels.
     """
-    # Sums of differences to the first frame: those of whole grey levels would be so large that float32 loses the
-    # small variance between the two.
+    # Sums of differences to the first frame: those of whole grey levels are large, and float32 would round off part of
+    # the small variance, which is their difference.
     total, squares = (np.zeros(frames[0].shape, np.float32) for _ in range(2))
     first = frames[0].astype(np.float32)
     for frame in frames:

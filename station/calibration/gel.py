@@ -99,7 +99,7 @@ def _named(image: Image, name: str) -> Image:
 
 def _lost_light(image: Image, golden: Image | None, least_light: float) -> list[Finding]:
     now = light(image)
-    # Without an earlier picture the colours are compared with each other: one dead LED does not move their median.
+    # Without an earlier picture the colours are compared with each other: with one LED dead the median is a lit one's.
     # Units differ in their light, so only a dead LED is certain then, and no dimmed one.
     before = (float(np.median(now)),) * 3 if golden is None else light(golden)
     limit = DEAD_LED if golden is None else least_light

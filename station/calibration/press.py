@@ -73,7 +73,6 @@ class BallPress:
 
     async def let_go(self) -> None:
         """Open the jaws after a failure, whose cause matters more than their own; to the end, also when called off."""
-        # `asyncio.wait` does not cancel what it waits for, so a further cancellation does not interrupt the opening.
         try:
             await release_to_the_end(self._rig)
         except StationError as error:
@@ -111,7 +110,7 @@ def contrast(image: Image, reference: Image, contact: Contact) -> float:
     if not contact.found or contact.centroid_px is None:
         return 0.0
     change = image.astype(np.float32) - reference
-    # The light's own change since the reference: a contact over less than half of the field does not move the median.
+    # The light's own change since the reference: a contact over less than half of the field hardly moves the median.
     change -= np.median(change[::4, ::4], axis=(0, 1))
     # The length over the colours: in their mean, opposite changes would cancel.
     length = np.linalg.norm(cv2.GaussianBlur(change, (0, 0), _CONTRAST_BLUR_PX), axis=2)

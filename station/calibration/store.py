@@ -201,7 +201,7 @@ def _picture(path: Path) -> Image:
 
 def _folders(folder: Path) -> list[Path]:
     try:
-        # A name with a dot is that of an unfinished record.
+        # A name that begins with a dot is that of an unfinished record.
         return [path for path in folder.iterdir() if path.is_dir() and not path.name.startswith(".")]
     except OSError:
         return []

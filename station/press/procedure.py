@@ -228,5 +228,5 @@ class _Search:
             if stop.touches(start):
                 return Onset(before, start)
             width_mm, nearer, touching = await self.first_contact(width_mm - self._rig.finest_step_mm)
-            # `nearer` is None where the next width shows a contact at once: `before` is then the last step without one.
+            # `nearer` is None where the next width shows a contact at once: the earlier `before` then remains.
             before = nearer or before

@@ -92,7 +92,7 @@ class StudyFolder:
                 "its samples cannot be mixed with new ones: name a new folder with --out"
             )
         if differing:
-            differing = [name for name in differing if name != "measured_by"]  # a checksum, which says nothing
+            differing = [name for name in differing if name != "measured_by"]  # a hash, which is of no use to a person
             words = ", ".join(f"{name} {theirs[name]} in place of {ours[name]}" for name in differing)
             raise BadInputError(f"{self.folder}: holds another study ({words}); name a new folder with --out")
 

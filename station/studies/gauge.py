@@ -117,7 +117,7 @@ def analyse(values: npt.ArrayLike, tolerance: float | None = None) -> Gauge:
         for name in shown
     )
     grr, between = sqrt(variances["GRR"]), sqrt(variances["PV"])
-    # AIAG's ndc: 1.41 times PV over GRR, rounded down.
+    # AIAG's ndc, with its rounded root of 2.
     categories = int(1.41 * between / grr) if grr else None if between else 0
     return Gauge(sources, pooled, components, categories, tolerance)
 

@@ -87,7 +87,7 @@ class FruitOnGel:
         # Raised texture would make the gap negative near the foremost point; `dent_mm` needs 0 or more.
         self._gap = np.maximum(0.0, shape + _BRIDGED * (coarse - wide)).astype(np.float32)
         height, width = SENSOR_SHAPE
-        # The true edge is cut at the sensor's resolution: on the grid it would have steps of two pixels.
+        # The true mask is made at the sensor's resolution: on the grid its edge would have steps of two pixels.
         self._fine_gap = np.asarray(cv2.resize(self._gap, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
 
     def pressed(self, squeezed: Squeezed) -> Footprint:

@@ -150,7 +150,7 @@ class Fruit:
 
     def texture_mm(self, x_mm: FloatArray, y_mm: FloatArray) -> FloatArray:
         """Return the skin's depth below its highest points, mm: pits, seeds, drupelets, calyx. Args as for `gap_mm`."""
-        # The second number separates the random streams of one seed: 0 draws the sizes, 1 the skin.
+        # The second number separates the random streams of one seed: 0 draws size and stiffness, 1 the skin.
         return self.variety.texture(x_mm, y_mm, np.random.default_rng([self.seed, 1]))
 
 

@@ -126,7 +126,7 @@ def dent_mm(gap_mm: FloatArray, approach_mm: float, surface: Surface, gel: Gel) 
     if approach_mm <= 0:
         return np.zeros_like(gap_mm)
     at_edge = surface.relative_squared(np.array([approach_mm / 2], np.float32))[0]
-    # At least 1: the halo has no value inside the contact, and np.where below computes it for every point.
+    # At least 1: the halo has no value inside the contact, but is computed for every point.
     outwards_squared = np.maximum(surface.relative_squared(gap_mm) / at_edge, np.float32(1.0))
     contact_radius_mm = np.float32(np.sqrt(approach_mm * surface.radius_mm))
     # An elliptic contact has no single radius: its mean one turns the relative distance into mm.

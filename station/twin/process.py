@@ -149,7 +149,7 @@ class Twin:
     def _lay(self, request: Mapping[str, Any]) -> str:
         """Lay a fruit into the nest in the place of what was there."""
         kind, seed = request.get("kind"), request.get("seed", 1)
-        # A list: in Python 3.11 `in Kind` raises TypeError for what is no member.
+        # A list: in Python 3.11 `in Kind` raises TypeError for every plain string, also for a member's value.
         if kind not in list(Kind):
             raise ValueError(f"kind: expected one of {', '.join(Kind)}, found {kind!r}")
         if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**31:

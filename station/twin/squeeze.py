@@ -45,7 +45,7 @@ class Squeeze:
         relaxed = 1.0 - variety.creep * (1.0 - np.exp(-held_s / fruit.retardation_s))
         plane = 1.0 - variety.poisson**2
         approach = np.linspace(0.0, 0.45 * fruit.width_mm, _SAMPLES)
-        # The contact's radius follows from the whole approach, however the two bodies share it.
+        # The contact's radius follows from the whole approach, independent of how the two bodies share it.
         gel_compliance = (1.0 - gel.poisson**2) / (gel.modulus_mpa * gel.stiffening(approach, self._radius_mm))
         softening = fruit.contact_softening(np.sqrt(approach * self._radius_mm))
         front_compliance = plane / (fruit.contact_modulus_mpa * softening * relaxed)

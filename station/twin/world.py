@@ -103,7 +103,7 @@ class World:
         if self._fruit is None or self._squeeze is None or self.sensor_mm() is None:
             return Squeezed(-self.width_mm(opening_mm), 0.0, 0.0, 0.0)
         closing_mm = self._fruit.width_mm + self._holder_mm - self.width_mm(opening_mm)
-        # Before the curve is read, since it may replace it.
+        # Before the curve is read: `_age` may replace it.
         self._age(self._fruit, touching=closing_mm > 0)
         squeezed = self._squeeze.at(closing_mm)
         if squeezed.force_n > self._fruit.variety.yield_n and (

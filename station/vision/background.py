@@ -207,8 +207,8 @@ def destriped(change: FloatImage, background: FloatImage, constants: Constants) 
 
 def _offsets(strips: FloatImage, background: FloatImage, axis: int, constants: Constants) -> FloatImage:
     """The lines' offsets along an axis, of length 1 along it."""
-    # The less background, the less a line's mean is believed: with 0.03 everywhere a blueberry that fills the field is
-    # wrong by half.
+    # The less background, the less a line's mean is believed: with the same prior everywhere, a blueberry that fills
+    # the field is wrong by half.
     known = min(max(float(background.mean()) / constants.known_share, _LEAST_KNOWN), 1)
     prior = strips.shape[axis] * min(constants.stripe_prior / known**2, 0.1)
     away = length_squared(strips - _line_means(strips, background, axis, NEXT_TO_NOTHING))

@@ -55,7 +55,7 @@ def body_candidates(moved: Movement, threshold: float, constants: Constants) -> 
     strongest = float(curvature.max())
     if strongest <= threshold:
         return Candidates([], level)
-    # Of a body just above the threshold hardly any place would be over it.
+    # Where the strongest curvature is just above the threshold, hardly any other place exceeds it.
     strong = level[curvature > min(threshold, _STRONG_SHARE * strongest)]
     spread_levels = seen.spread(moved)
     lowest = max(_OVER_SPREAD * spread_levels, constants.candidate_share * quantile(strong, _LOW_QUANTILE))

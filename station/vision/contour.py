@@ -226,7 +226,7 @@ def _steepest(
     steepest = steepest[steepest > 0]
     strong = steepest[int(constants.strong_quantile * (steepest.size - 1))] if steepest.size else 1.0
     least = constants.least_steepness
-    # A ray is worth 1 at most: a few very steep ones cannot pull the path away from all others.
+    # A place is worth 1 at most: a few very steep rays cannot pull the path away from all others.
     reward = np.maximum(np.minimum(fall * (1 / strong), 1) - least, 0) * (1 / (1 - least))
     path = closed_path(-reward, stiffness)
     side = max(1, round(_SIDE_SHARE / (shares[1] - shares[0])))

@@ -86,7 +86,7 @@ def brightest_cluster(denoised: Image, parameters: PaperParameters) -> Mask:
         Shape (height, width), dtype uint8, 0 or 255.
     """
     pixels = denoised.reshape(-1, 3).astype(np.float32)
-    # OpenCV's generator goes on from call to call: without a seed one image would give several areas.
+    # OpenCV's generator goes on from call to call: without a seed one image could give different areas.
     cv2.setRNGSeed(parameters.seed)
     criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, _KMEANS_ITERATIONS, _KMEANS_EPSILON)
     labels: npt.NDArray[np.int32]

@@ -227,7 +227,7 @@ def _is_skin_by_curvature(moved: Movement, halved: Movement, region: Mask, const
 def _fine_share(change: FloatImage, region: Mask, constants: Constants) -> float:
     """Return the share of a region's squared change that is as fine as achenes: medians' ratio, 0 in too few pixels."""
     size = (change.shape[1], change.shape[0])
-    # The constants are on the half grid, and this change is at half of its size.
+    # The constants are for the half grid, and this change has half of that size.
     sigmas = (constants.level_window / 2, constants.coarse_blur / 2)
     elements, slopes = (np.asarray(cv2.GaussianBlur(change, (0, 0), sigma), np.float32) for sigma in sigmas)
     inside = cv2.resize(region, size, interpolation=cv2.INTER_NEAREST) > 0

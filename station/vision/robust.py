@@ -189,7 +189,7 @@ class RobustMethod:
         self._clean = resized(self._debris.clean, self._quarter)
         self._weak = WeakContactDetector(self._light, lit, self._debris.clean, constants, parameters.gate_ratio)
         unsaturated = np.asarray((self._reference < SATURATED_LEVEL).all(axis=2), np.float32)
-        # Where the reference is cut off, its difference from a frame says nothing of the gel's slope.
+        # Where the reference is cut off, its difference from a frame does not show the gel's slope.
         self._unsaturated = cv2.merge([resized(unsaturated, self._half)] * 3)
         # The response sums up the colours: without light in one of them the same curvature shows less.
         least = float(np.mean(lit)) * parameters.least_bend
@@ -436,7 +436,7 @@ class RobustMethod:
         # fruit's holds little change too: the flat middle of its contact is most of it.
         drawn = state.gate > 1 or cv2.countNonZero(state.changed) >= self._constants.witness_least * shown_px
         held = state.mask | before.least if drawn else before.least
-        # A faint body's outline does not grow with the compression; what has changed does, so that steps do not tie.
+        # A faint body's outline may not grow with the compression; what has changed does, and makes the areas differ.
         if not drawn or np.array_equal(held, before.least):
             height, width = self._shape[:2]
             changed = cv2.resize(state.changed, (width, height), interpolation=cv2.INTER_NEAREST)
@@ -479,7 +479,7 @@ class RobustMethod:
         known = None
         if "texture" in self._without:
             known = False
-        # With hardly any background directions say little of the skin: what an earlier step has seen of it holds.
+        # With hardly any background the change's directions hardly show skin: an earlier step's finding is used.
         elif state.before is not None and state.background.share < self._constants.known_share / 2:
             known = state.before.textured
         return find_region(state.moved, start, self._constants, others, state.floor, texture=known)

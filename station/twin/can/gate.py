@@ -75,7 +75,7 @@ class RejectGate(TwinNode):
             self._station_s = None  # watched again from its next beat on (CiA 301, heartbeat consumer)
             self.raise_error(_HEARTBEAT_LOST, _COMMUNICATION)
             if self.operational:
-                # CiA 301: 1029 selects the state after an error of communication; 1 is none other.
+                # CiA 301: 1029 selects the state after a communication error; 1 means no change.
                 state = {0: "PRE-OPERATIONAL", 2: "STOPPED"}.get(self.read(0x1029, 1))
                 if state is not None:
                     self.local.nmt.state = state
@@ -99,7 +99,7 @@ class RejectGate(TwinNode):
         self._count = None
         self._counted_s = self._clock.now_s()
         if self.operational:
-            # Not by the next heartbeat: the gate works again only after the station has brought it up anew.
+            # Not by the next heartbeat: a gate that left operational works again only once the station has started it.
             self.clear_error(_HEARTBEAT_LOST)
 
     def _on_station(self, _can_id: int, _data: bytearray, _timestamp: float) -> None:
@@ -129,7 +129,7 @@ class RejectGate(TwinNode):
         names = ("Sequence", "Lane", "Pulse in ms", "Fire at count")
         shot = Shot(*(int(pdo[f"Shot order.{name}"].raw) for name in names))
         if shot.sequence in self._armed:
-            # An order that is repeated is confirmed again and stays one shot.
+            # An armed order that is repeated is confirmed again and stays one actuation.
             answer = _ARMED
         elif not 1 <= shot.lane <= _LANES or not shot.pulse_ms:
             answer = _BAD

@@ -44,7 +44,7 @@ def _banks(levels: tuple[float, ...], seed: int) -> tuple[list[FloatArray], Mapp
         # By OpenCV: numpy takes four times as long for sums and products along pixels of three channels.
         white = cv2.transform(generator.standard_normal((rows, columns, 3), np.float32), mix)
         field = cv2.GaussianBlur(white, (0, 0), _BLUR_ACROSS_PX, sigmaY=_BLUR_DOWN_PX)
-        # The blur lowers the spread, so that each field is scaled by its own to the level.
+        # The blur lowers the spread: each field is scaled from the spread that it has to the level.
         spread = cv2.meanStdDev(field)[1].ravel()
         banks.append(np.asarray(cv2.transform(field, np.diag(np.divide(levels, spread))), np.float32))
     return banks, generator.bit_generator.state
@@ -78,7 +78,7 @@ class FrameNoise:
         white = self._generator.standard_normal((1, length, 3), np.float32)
         # To OpenCV a sigmaY of 0 would mean sigmaX.
         line = cv2.GaussianBlur(white, (0, 0), _LINE_BLUR_PX, sigmaY=1e-3, borderType=cv2.BORDER_REFLECT)[0]
-        # A Gaussian blur of width s leaves white noise a variance of 1 / (2·√π·s); the root restores it to 1.
+        # A Gaussian blur of width s leaves white noise a variance of 1 / (2·√π·s); the factor restores it to 1.
         return (line * (level * np.float32(np.sqrt(2.0 * np.sqrt(np.pi) * _LINE_BLUR_PX)))).astype(np.float32)
 
 

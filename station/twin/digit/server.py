@@ -287,7 +287,7 @@ class DigitCameraServer:
             return self._garbage.bytes(4096)
         image = captured.image
         if self.faults.active(CommonFault.WRONG):
-            # `cast` below needs contiguous memory, which a strided view has not.
+            # `cast` below needs contiguous memory, which a strided view does not have.
             image = np.ascontiguousarray(image[::2, ::2])
         return packed(
             "frame",

@@ -44,7 +44,7 @@ class RtuSerialServer:
     async def start(self) -> None:
         """Open the line. The far end is held open too, so that the line outlives its users."""
         near, far = pty.openpty()
-        # As opened it is a console's line, which echoes and translates bytes.
+        # A new pseudo-terminal is in a console's mode, which echoes and translates bytes.
         tty.setraw(far)
         os.set_blocking(near, False)
         self.path = os.ttyname(far)

@@ -63,7 +63,7 @@ class RequestFramer:
         """The length of the frame that the buffer begins with, 0 while it is unknown."""
         if len(self._buffer) < 2:
             return 0
-        # A write of several registers has a byte count; every other request here has two words, 8 bytes with its CRC.
+        # Both functions that write have a byte count; a request to read has two words, 8 bytes with its CRC.
         counter_at = {_WRITE: 6, _READ_WRITE: 10}.get(self._buffer[1])
         if counter_at is not None:
             return counter_at + 1 + self._buffer[counter_at] + 2 if len(self._buffer) > counter_at else 0

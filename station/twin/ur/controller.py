@@ -183,7 +183,7 @@ class UrController:
         loop = asyncio.get_running_loop()
         self._due_s += CYCLE_S
         late_s = loop.time() - self._due_s
-        # Fewer late cycles are made up for in a row, so that clients get their 500 packages a second.
+        # Up to `LATE_CYCLES` are made up for in a row, so that clients get their 500 packages a second; more are lost.
         if late_s > LATE_CYCLES * CYCLE_S:
             self._due_s = loop.time()
         if late_s > _STOOD_STILL_S:

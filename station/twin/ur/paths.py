@@ -66,7 +66,7 @@ class ToolPath:
         flanges[:, :3, :3] = [start[:3, :3] @ rotation_from_vector(fraction * turn) for fraction in fractions]
         self._joints = _follow(start_joints, inverse(flanges))
         self._pieces = pieces
-        # It divides: a way of no length has pieces of 1.0, on which every slope is 0.
+        # It divides: a way of no length has pieces of 1.0, on which the slopes are about 0.
         self._piece = self.length / pieces or 1.0
 
     @property
