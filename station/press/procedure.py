@@ -5,7 +5,6 @@ What differs is the rig and the observer.
 """
 
 import asyncio
-import contextlib
 from typing import NamedTuple, Protocol
 
 from station.errors import StationError
@@ -64,13 +63,23 @@ async def press(rig: MovingRig, recipe: Recipe, observer: Observer) -> None:
 
 
 async def release_to_the_end(rig: Rig, failed: Message | None = None) -> None:
-    """Release by `Rig.release`, also where the caller is cancelled meanwhile: jaws must not stop halfway on a fruit."""
+    """Release by `Rig.release`, also where the caller is cancelled meanwhile: jaws must not stop halfway on a fruit.
+
+    Raises:
+        GripError: as `Rig.release`.
+        asyncio.CancelledError: the caller was cancelled meanwhile; raised once the fruit is released.
+    """
+    called_off: asyncio.CancelledError | None = None
     releasing = asyncio.create_task(rig.release(failed), name="release")
     while not releasing.done():
-        with contextlib.suppress(asyncio.CancelledError):
+        try:
             # `asyncio.wait` does not cancel what it waits for, so a cancellation does not interrupt the opening.
             await asyncio.wait({releasing})
+        except asyncio.CancelledError as error:
+            called_off = error
     releasing.result()
+    if called_off is not None:
+        raise called_off
 
 
 async def _start(rig: MovingRig, recipe: Recipe, observer: Observer) -> Step | None:

@@ -104,6 +104,8 @@ class RejectGate(TwinNode):
 
     def _on_station(self, _can_id: int, _data: bytearray, _timestamp: float) -> None:
         self._station_s = self._clock.now_s()
+        if self.operational:  # by object 1029 it was not left
+            self.clear_error(_HEARTBEAT_LOST)
 
     def _on_count(self, pdo: PdoMap) -> None:
         # A frame shorter than its mapping would be read as a wrong count.

@@ -221,18 +221,18 @@ class UrController:
         if not begun and not ended:
             return
         self._known_faults = set(faults)
+        if CommonFault.OFF in ended:
+            self._boot(self.body.joints_rad, running=False)
+            begun |= faults & {"emergency_stop"}  # the button is still pressed where the controller starts
         self._begin_faults(begun, now_s)
         if "emergency_stop" in ended:
             self.safety.release_emergency_stop()
         if "local_mode" in begun | ended:
-            self.safety.remote = "local_mode" not in faults
             self.network.cut_programmers()
         reachable = {CommonFault.OFF, "link_cut"}
         if (begun | ended) & reachable:
             self._switching = asyncio.create_task(self._switch_network(on=not faults & reachable))
-        if CommonFault.OFF in ended:
-            self._boot(self.body.joints_rad, running=False)
-        self.safety.guard_open = "safeguard" in faults
+        self.safety.remote, self.safety.guard_open = "local_mode" not in faults, "safeguard" in faults
 
     def _begin_faults(self, begun: frozenset[str], now_s: float) -> None:
         if "protective_stop" in begun:

@@ -10,6 +10,7 @@ import pytest
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.ur import UrArm
 from station.messages import arm as messages
+from station.twin.ur.safety import SafetyMode
 from station.twin.ur.script import ControlScript, RuntimeState
 from tests.devices.arm.states import A_TENTH, AWAY, cause_of, has_cause, moving
 
@@ -175,6 +176,21 @@ def test_local_control_that_ends_before_the_controllers_next_cycle_leaves_it_rem
             bench.faults.set("safeguard")
             await until(lambda: bench.controller.safety.guard_open)
             assert bench.controller.safety.remote
+
+    asyncio.run(run())
+
+
+def test_a_controller_that_starts_finds_the_pendants_key_and_button_as_they_are(healthy_arm, until):
+    async def run():
+        async with healthy_arm() as (bench, _):
+            for fault in ("local_mode", "emergency_stop", "off"):
+                bench.faults.set(fault)
+            before = bench.controller.safety
+            await until(lambda: before.safety_mode is SafetyMode.ROBOT_EMERGENCY_STOP)
+            bench.faults.clear("off")
+            await until(lambda: bench.controller.safety is not before)
+            safety = bench.controller.safety
+            assert (safety.remote, safety.safety_mode) == (False, SafetyMode.ROBOT_EMERGENCY_STOP)
 
     asyncio.run(run())
 
