@@ -120,7 +120,7 @@ def _plc_wrote(work: Work, event: PlcWrote) -> None:
     changed = event.inputs.acknowledged_sequence not in {before.acknowledged_sequence, 0}
     acknowledged = state.journal.acknowledged
     had = {acknowledged, state.journal.plc_taken or acknowledged, state.taken or acknowledged}
-    # A bit left high over a reconnect is for what the PLC had taken, and no wrong acknowledgement.
+    # A bit that is high in a writer's first write, with the number of what the PLC took, is no wrong acknowledgement.
     left_high = seen is None and event.inputs.acknowledged_sequence in had
     _acknowledged(work, event, rose, changed=changed, left_high=left_high)
     if "acknowledge" in fell:

@@ -31,7 +31,7 @@ def no_result(running: Running, at: Moment, *reasons: Reason) -> Outcome:
         closing_mm=None,
         confidence=None,
         ended_utc_ms=at.utc_ms,
-        # Over a restart it is counted by UTC, and a clock that jumps must not exceed the register.
+        # After a restart it is counted by UTC: a clock that was set must not give more than the register holds.
         duration_ms=max(0, min(round(1000 * (at.s - running.began_s)), 2**32 - 1)),
     )
 

@@ -29,8 +29,8 @@ def resynchronise(work: Work) -> None:
     state, opened = work.state, work.event.opened
     state.open_request, state.last_failure = None, ""
     final = {outcome.sequence: outcome for outcome in (*state.journal.verdicts, *state.queue)}
-    # Notes may have been lost with the link. Outcomes come before acknowledgements: the station leaves out that of an
-    # outcome that it does not have.
+    # Notes may have been lost with the link. Outcomes come before acknowledgements: the station acknowledges only what
+    # it has noted as published.
     work.actions += [NotifyPublished(final[sequence]) for sequence in sorted(final)]
     for outcome in sorted(opened.outcomes, key=lambda outcome: outcome.sequence):
         _resynchronise_outcome(work, outcome, known=outcome.sequence in final)
@@ -54,7 +54,7 @@ def _resynchronise_outcome(work: Work, outcome: Outcome, *, known: bool) -> None
     if state.running is not None and sequence == state.running.sequence:
         work.found = outcome
         work.signals.append(Signal.OUTCOME)
-    elif sequence <= journal.acknowledged:  # the PLC has taken it, and the station has missed that
+    elif sequence <= journal.acknowledged:  # taken, or never shown to the PLC; the station has missed that
         acknowledge(work, journal.acknowledged)
     elif known or _may_be_pending(work, sequence):
         return

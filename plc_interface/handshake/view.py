@@ -122,7 +122,7 @@ def result_values(outcome: Outcome) -> dict[str, Value]:
         "result_reasons": _REASONS.flags(reason.value for reason in outcome.reasons),
         "result_area_mm2_x100": None if area is None else _bounded(100 * area, 0, 2**31 - 1),
         "result_area_mm2": None if area is None else min(area, 3.4e38),
-        # The end of this register's range, and of the closing's, says that there is none: the bound is one before it.
+        # One end of this register's range, and of the closing's, means none: the bound is one short of it.
         "result_area_px": None if outcome.area_px is None else min(outcome.area_px, 2**32 - 2),
         "result_closing_mm_x100": (
             None if outcome.closing_mm is None else _bounded(100 * outcome.closing_mm, -(2**15) + 1, 2**15 - 1)

@@ -89,7 +89,7 @@ class RejectGate:
         """Order a reject actuation for what may not go on. An outcome may come again after a restart."""
         if not self._may_go_on(outcome) and outcome.sequence not in self._due:
             self._due[outcome.sequence] = at_count = self._io.count_at_gate(outcome.encoder)
-            # On the disk before the caller's journal has the outcome, which is then not forwarded again.
+            # In this file before the caller's journal has the outcome, which is then not forwarded again.
             self._file.write(self._due)
             self._order(outcome.sequence, at_count)
 

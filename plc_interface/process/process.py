@@ -69,5 +69,5 @@ async def serve(configuration: Configuration) -> None:
         await server.stop()
         await interface.stop()
         await output.stop()
-        # Last: until here this process may write the journal, and a second interface must not start.
+        # Last: until here this process may write files in the journal's folder, and no second interface may start.
         journal.close()

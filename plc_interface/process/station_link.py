@@ -152,7 +152,6 @@ class StationLink:
             event = ev.OutcomeReceived(now(), outcome)
         except ChannelError as error:
             event = ev.OutcomeFailed(now(), action.sequence, str(error))
-        # A newer request for the same outcome may have taken this one's place.
         if self._outcomes.get(action.sequence) is asyncio.current_task():
             del self._outcomes[action.sequence]
         self._feed(event)

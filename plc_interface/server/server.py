@@ -88,7 +88,7 @@ class ModbusServer:
         self._manager.close()
         if self._handshakes is not None:
             await self._handshakes.close()
-        # Transports close their sockets in the loop's next turn.
+        # A plain transport closes its socket in the loop's next turn.
         await asyncio.sleep(0)
 
     async def _listen(self, section: str, port: int, protocol: Callable[[], asyncio.BaseProtocol]) -> None:

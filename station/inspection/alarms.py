@@ -243,7 +243,11 @@ def _moved(alarm: Alarm, event: AlarmEvent) -> Alarm:
 
 
 def _ticked(alarm: Alarm, now_s: float) -> Alarm:
-    """An alarm after what time alone changes; a clock set back prolongs neither shelving nor chattering."""
+    """An alarm after what time alone changes.
+
+    However far the clock is set back, from then on shelving lasts `LONGEST_SHELVED_S` at most, and an alarm that
+    chattered stays for `CHATTER_S` at most.
+    """
     if alarm.shelved_until_s is not None and not 0 <= alarm.shelved_until_s - now_s <= LONGEST_SHELVED_S:
         alarm = _moved(alarm, E.UNSHELVED)
     if alarm.quiet_since_s is not None and not 0 <= now_s - alarm.quiet_since_s < CHATTER_S:

@@ -141,7 +141,7 @@ def _longest_path_s(recipe: Recipe, pace: Pace) -> float:
     """The time of a fruit that is centred and pressed as often as the recipe may, each time to its last limit."""
     speed_mm_s, step_mm = recipe.gripper.speed_mm_s, recipe.steps.step_mm
     capturing_s = recipe.imaging.frames_per_step / pace.frames_per_s
-    # The arm and the jaws move at once.
+    # The arm and the jaws move at the same time.
     approach_s = max(pace.arm_way_s, pace.stroke_mm / pace.opening_mm_s) + _RAMP_S
     expected = recipe.expected_width
     # From around the largest fruit down to a step below the smallest one, where the approach ends (`stop.lowest_mm`).
@@ -152,7 +152,7 @@ def _longest_path_s(recipe: Recipe, pace: Pace) -> float:
     steps = recipe.steps.number
     if recipe.steps.stop_when_decided:
         steps = min(steps, ceil(recipe.damage.area[-1].closing_mm / step_mm))
-    # A step is measured while the next one is made, so that the slower of both counts; the last two have no next one.
+    # A step is measured while the next one is made: the slower of both counts. Two may be left after the last image.
     step_s = max(step_mm / speed_mm_s + _RAMP_S + recipe.imaging.settle_s + capturing_s, pace.measure_s)
     press_s = steps * step_s + 2 * pace.measure_s
     # The jaws open beside the fruit, the sensor moves, and the jaws close again to where it was met.

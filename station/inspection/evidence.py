@@ -192,7 +192,7 @@ class Evidence:
         return None if None in begins else max(begin for begin in begins if begin is not None)
 
     def _windows(self, points: Sequence[Measured]) -> list[Sequence[Measured]]:
-        """Runs of at least four points and two millimetres; all of fewer points where they are no two of one width."""
+        """Runs of at least four points and two millimetres; without one all points, if they are not of one count."""
         windows: list[Sequence[Measured]] = []
         for end in range(len(points), 0, -1):
             start = end - _WINDOW_POINTS
@@ -201,8 +201,8 @@ class Evidence:
             if start < 0:
                 break
             windows.append(points[start:end])
-        # Images on the way are taken between two counts of the gripper: those of one count may be as far from each
-        # other as it, and an area over the way that they seem to have is any growth.
+        # The width of an image on the way is interpolated: two of one count of the gripper may be that count apart and
+        # read as a few hundredths of a millimetre, over which a growth may have any value.
         apart = len(points) > 1 and points[-1].closing_mm - points[0].closing_mm > self._press.resolution_mm / 2
         return windows[::-1] or ([points] if apart else [])
 
@@ -236,7 +236,7 @@ class Evidence:
 
 def _begins_at_mm(points: Sequence[Measured]) -> float | None:
     steps = _slopes(points)
-    # Medians, as for the growth: of four steps or more a single wrong one hardly moves them.
+    # Medians, as for the growth: of five points or more a single wrong one hardly moves them.
     slope = median(steps) if steps else 0.0
     return median(point.closing_mm - point.area_mm2 / slope for point in points) if slope > 0 else None
 

@@ -69,7 +69,8 @@ class Judgement:
     areas: tuple[AreaAt, ...]
     """At each of the recipe's results' closings."""
     growth: Growth | None
-    """The steepest over a few steps; None with fewer than two points beyond a light touch."""
+    """The steepest over a few steps; None where no two points beyond a light touch are half a count of the gripper
+    apart."""
     partial: bool
     """A result's closing was not reached; where the steps end when decided, a damage threshold's."""
     stopped: Stop | None
@@ -326,7 +327,7 @@ def _void(press: Press, limits: SizedLimits) -> Iterator[Finding]:
             yield Finding(Reason.NO_CONTACT, messages.NOTHING_TOUCHED())
         return
     if press.onset_uncertainty_mm is None:
-        # The fruit is wider than this image's width by an unknown way: neither its width nor its size can be checked.
+        # The fruit is wider than this width by an unknown amount: neither its width nor its size can be checked.
         why = messages.TOUCHED_AT_FIRST(width_mm=press.onset_mm)
         yield Finding(Reason.OUT_OF_RANGE, why, press.onset_mm, None, 0.0)
         return

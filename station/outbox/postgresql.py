@@ -185,7 +185,7 @@ class Session:
             try:
                 async with self._connection.transaction():
                     await self._write((event,))
-                    # It is emptied by the commit only: the next event's statement would take this one again.
+                    # Only the commit empties the table: the next event's statement would take this one again.
                     await self._connection.execute("DELETE FROM incoming")
             except (psycopg.DataError, psycopg.IntegrityError) as error:
                 self._owner.refused += 1

@@ -61,7 +61,7 @@ def open_engine(path: Path, mode: Literal["ro", "rw", "rwc"]) -> Engine:
 
     @event.listens_for(engine, "begin")
     def _begin(connection: Connection) -> None:
-        # A writer locks at once: where another one wrote since its first read, SQLite refuses the lock without waiting.
+        # A writer locks first: SQLite refuses the lock without waiting where another one wrote since its first read.
         connection.exec_driver_sql("BEGIN" if read_only else "BEGIN IMMEDIATE")
 
     return engine
@@ -76,7 +76,7 @@ def check(path: Path, within_s: float = CHECK_S) -> None:
     """
     until_s = time.monotonic() + within_s
     try:
-        # An existing one: a file that is gone by now would be made anew, empty.
+        # Not `rwc`, the default: a file that is gone by now would be made anew, empty.
         uri = f"{path.resolve().as_uri()}?mode=rw"
         with closing(sqlite3.connect(uri, uri=True, timeout=BUSY_MS / 1000)) as connection:
             connection.set_progress_handler(lambda: time.monotonic() > until_s, _CHECK_INSTRUCTIONS)

@@ -209,8 +209,8 @@ def _connector(
 
     def before_commit(connection: Connection) -> None:
         nonlocal saved, ahead
-        # Before the commit: a number that the file alone has is skipped; one that the database alone has could be given
-        # twice.
+        # Before the commit: a number that the file alone has is skipped; one that the database alone has would be given
+        # again if that database were lost.
         if mark.value != saved:
             mark.save()
             saved = mark.value

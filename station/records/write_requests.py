@@ -162,7 +162,7 @@ def publish(connection: Connection, outcome: Outcome, given_up_to: int, boot: st
     connection.execute(_UPDATE, {"number": outcome.sequence, **published})
     stood = None if found is None or found.standing is None else Outcome.model_validate_json(found.standing)
     index_reasons(connection, stood, outcome)
-    # Only where it changes: another seal would cover what somebody else may have changed since.
+    # Only where it changes: another seal would cover a change that another program may have made since.
     if stood != outcome:
         seal(connection, outcome.sequence, "outcome")
     queue_event(connection, "inspection", outcome.sequence)

@@ -86,7 +86,7 @@ class Writer:
             Its result once it is durable, or a `RecordsError`.
         """
         future: Future[T] = Future()
-        # Under the lock, so that no request is queued behind the entry that ends the thread.
+        # Under the lock, so that no other thread queues a request behind the entry that ends the writer.
         with self._gate:
             if self._closed and threading.current_thread() is not self._thread:
                 future.set_exception(RecordsClosedError(messages.CLOSED(), messages.OPEN_FIRST()))

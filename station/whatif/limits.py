@@ -210,7 +210,7 @@ def _cheapest(steps: Values, cost: Values, there: npt.NDArray[np.bool_]) -> Valu
     ends = np.where(np.isfinite(ends), ends, steps)
     # Equal costs may differ by rounding.
     cheap = cost <= cost.min(axis=1, keepdims=True) + 1e-12
-    # Gap and middle are those of the logarithm, as areas differ by shares.
+    # A gap's width is a ratio, and its middle the geometric mean, as areas differ by shares.
     widest = np.where(cheap, ends / steps, 0.0).argmax(axis=1)
     low, high = steps[widest], ends[np.arange(len(cost)), widest]
     # Rounding must not take the limit below the value that it includes.

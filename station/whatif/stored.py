@@ -191,7 +191,7 @@ def _images(
     for sequence, kind, step, sha256 in rows:
         try:
             data = Path(image_path(folder, sha256)).read_bytes()
-        # Housekeeping may have removed it; `remeasured` reports an image that is missing.
+        # The image store may have removed it for its quota; `remeasured` reports an image that is missing.
         except OSError:
             continue
         found.setdefault(sequence, []).append((None if kind == "reference" else step, data))

@@ -49,7 +49,7 @@ def _why_no_evidence(own: Recipe | None, recipe: Recipe) -> str | None:
 
 
 def draft_recipe(recipe: Recipe, best: Proposal, name: str, folder: Path | None) -> tuple[Recipe, str]:
-    """Return the recipe's text with the limit in the place of the one at its closing, or the next, or the last.
+    """Return the draft and its text: the limit replaces the one at its closing, else the next one, else the last.
 
     Earlier limits are lowered and later ones raised where necessary, since limits rise with the closing. The comment
     behind each changed value says where the new one comes from.

@@ -295,8 +295,8 @@ class LineIo:
             await self._order(link, node, "PRE-OPERATIONAL", _PRE_OPERATIONAL)
         await self._in_worker(lambda: bring_up.configure_encoder(encoder, settings))
         await self._in_worker(lambda: bring_up.configure_gate(gate, settings))
-        # From its first heartbeat after that configuration the gate watches the station (CiA 301): at once, so that it
-        # is never operational for a station that has just gone.
+        # The gate watches the station from the first heartbeat after this configuration (CiA 301). One is sent now, so
+        # that it watches before it becomes operational.
         self._send_beat(link)
         for node in (encoder, gate):
             if standing := await self._in_worker(lambda node=node: bring_up.active_error(node)):

@@ -135,7 +135,7 @@ class UrRtdeProcess:
             control = self._commanding()
             x, y, z, rx, ry, rz = control.getForwardKinematics(joints, self._tool())
             pose = list(offset_pose((x, y, z, rx, ry, rz), request.offset_mm))
-            # Checked first: without a solution getInverseKinematics ends the control program.
+            # Checked first: without a solution URScript's get_inverse_kin ends the control program by an exception.
             if not control.getInverseKinematicsHasSolution(pose, joints):
                 return False
             found.extend(control.getInverseKinematics(pose, joints))

@@ -107,5 +107,5 @@ def find_seam(image: Image, axis: int) -> int | None:
     whole = (low + 3 * high) / 4
     place = int(np.argmax(whole))
     around = np.median(whole[max(0, place - _SEAM_AROUND_PX) : place + _SEAM_AROUND_PX + 1])
-    # `step` begins 2 * half places into `change`, and a seam is `half` lines behind the first line of its difference.
+    # `step` begins 2 * half places into `change`, and a seam is `half` lines after the first line of its change.
     return place + 3 * half if whole[place] - around > _SEAM_LEVELS else None

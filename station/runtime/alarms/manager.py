@@ -49,7 +49,7 @@ OF_DEVICE: dict[str, frozenset[AlarmId]] = {
 _OF_THE_PAST = {AlarmId.RECORDS_LOST, AlarmId.GATE_NOT_FIRED}
 """Alarms of what has happened once, which no check finds undone: a person's acknowledgement ends them."""
 _MOST_UNSAVED = 1000
-"""Changes remembered while the records cannot be written; an estimate of a day's."""
+"""Maximum number of changes that wait for records that cannot be written; the oldest is dropped. An estimate."""
 _ARM = {
     ArmCause.EMERGENCY_STOP: AlarmId.EMERGENCY_STOP,
     ArmCause.PROTECTIVE_STOP: AlarmId.PROTECTIVE_STOP,
@@ -160,7 +160,7 @@ class AlarmManager:
         """Raise the alarm of the fault of the `arm`, `gripper` or `camera`, or clear the alarms of a healthy one."""
         alarm = None if fault is None else alarm_of(device, fault)
         before, self._device_alarms[device] = self._device_alarms.get(device), alarm
-        # A device that was not heard since the start may still have the cause of an alarm that it shares with this one.
+        # A device whose monitor has not decided yet may have the cause of an alarm that it shares with this one.
         kept = {other for name in self._watched if name not in self._device_alarms for other in OF_DEVICE[name]}
         if self._stopped_on_pendant():
             kept.add(AlarmId.ARM_NOT_REMOTE)

@@ -42,7 +42,7 @@ class Hold:
                 "the disk is slow: if the process is killed now, the next start does not know of %s",
                 self.event or "the end of the hold",
             )
-            # Stored, since the event loop refers to its tasks only weakly.
+            # The event loop has only weak references to its tasks.
             self._late.add(storing)
             storing.add_done_callback(self._late.discard)
 

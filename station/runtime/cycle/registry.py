@@ -131,7 +131,7 @@ class InspectionRegistry:
         Raises:
             RecordsError: it cannot be stored now.
         """
-        # A refused trigger's end and the clearing may come at once: each inspection is delivered once.
+        # A refused trigger's end and the clearing may run at the same time: each inspection is delivered once.
         async with self._closing:
             while (now := self.running) is not None:
                 now.outcome_name = "NO_RESULT"

@@ -33,7 +33,7 @@ class DeviceMonitor:
     Args:
         name: of the device, as in the log; its title is what a person reads.
         on_change: gets the fault from now on, None for no fault.
-        on_progress: called after each check, with any result.
+        on_progress: called after each check, healthy or not, in long pauses, and while an inspection uses the device.
     """
 
     def __init__(

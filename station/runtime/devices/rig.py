@@ -221,7 +221,7 @@ def _combined(after: Message | None, reason: Message, alone: Definition, with_sa
 
 
 async def at_once(*works: Coroutine[None, None, T]) -> list[T]:
-    """Run several coroutines, not started yet, at once; if one fails the others are cancelled, and its error is raised.
+    """Run coroutines, not started yet, concurrently; if one fails the others are cancelled, and its error is raised.
 
     Returns:
         Their results, in their order.

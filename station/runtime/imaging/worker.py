@@ -34,7 +34,7 @@ class VisionWorker:
 
     def __init__(self, golden: GoldenReference, settings: ReferenceSettings) -> None:
         sys.setswitchinterval(_SWITCH_S)
-        # One core is left: with OpenCV on all, the slowest replies to the PLC took six times as long.
+        # One core is left for the PLC interface's process, whose replies have hard time limits (decision 17).
         cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))
         self._golden, self._settings = golden, settings
         self._worker = ThreadPoolExecutor(1, "vision")
@@ -86,7 +86,7 @@ class VisionWorker:
         """Start measuring one frame, of the reference's shape, of the next step; `measure` then has less to do."""
 
         def measure() -> None:
-            # Checked again in its turn: a reference may be taken before.
+            # Checked again in its turn: a reference that was refused meanwhile leaves none.
             if self._measurement is not None:
                 self._measurement.prepare_next(frame.image)
 
