@@ -185,10 +185,10 @@ class Evidence:
         Where points are excused, the trusted ones have to show it too, with the first beyond the needed ones: the later
         of both begins.
         """
-        begins = [_begins_at_mm(self.needed)]
+        begins = [self._begins_at_mm(self.needed)]
         if self.excused:
             beyond = [point for point in self.judged if point not in self.needed and self.bounds(point)]
-            begins.append(_begins_at_mm([*(point for point in self.needed if self.bounds(point)), *beyond[:1]]))
+            begins.append(self._begins_at_mm([*(point for point in self.needed if self.bounds(point)), *beyond[:1]]))
         return None if None in begins else max(begin for begin in begins if begin is not None)
 
     def _windows(self, points: Sequence[Measured]) -> list[Sequence[Measured]]:
@@ -201,10 +201,18 @@ class Evidence:
             if start < 0:
                 break
             windows.append(points[start:end])
-        # The width of an image on the way is interpolated: two of one count of the gripper may be that count apart and
-        # read as a few hundredths of a millimetre, over which a growth may have any value.
-        apart = len(points) > 1 and points[-1].closing_mm - points[0].closing_mm > self._press.resolution_mm / 2
-        return windows[::-1] or ([points] if apart else [])
+        return windows[::-1] or ([points] if self._shows_slope(points) else [])
+
+    def _shows_slope(self, points: Sequence[Measured]) -> bool:
+        """Return whether points, in the order of their closing, are not all of one count of the gripper."""
+        # The width of an image on the way is interpolated: two of one count may be that count apart and read as a few
+        # hundredths of a millimetre, over which a slope may have any value.
+        return len(points) > 1 and points[-1].closing_mm - points[0].closing_mm > self._press.resolution_mm / 2
+
+    def _begins_at_mm(self, points: Sequence[Measured]) -> float | None:
+        # Medians, as for the growth: of five points or more a single wrong one hardly moves them.
+        slope = median(_slopes(points)) if self._shows_slope(points) else 0.0
+        return median(point.closing_mm - point.area_mm2 / slope for point in points) if slope > 0 else None
 
     def _step_uncertainty_mm2(self, point: Measured) -> float:
         """Of a point's area against its neighbours'; what they share shifts them alike."""
@@ -232,13 +240,6 @@ class Evidence:
         trusted = not lost and all(self.bounds(point) for point in window)
         few = len(window) < _WINDOW_POINTS or window[-1].closing_mm - window[0].closing_mm < _WINDOW_MM
         return Growth(slope, uncertainty, window[0].closing_mm, window[-1].closing_mm, few, trusted)
-
-
-def _begins_at_mm(points: Sequence[Measured]) -> float | None:
-    steps = _slopes(points)
-    # Medians, as for the growth: of five points or more a single wrong one hardly moves them.
-    slope = median(steps) if steps else 0.0
-    return median(point.closing_mm - point.area_mm2 / slope for point in points) if slope > 0 else None
 
 
 def _at(point: Measured, named_mm: Sequence[float]) -> Measured:

@@ -76,9 +76,7 @@ def check(path: Path, within_s: float = CHECK_S) -> None:
     """
     until_s = time.monotonic() + within_s
     try:
-        # Not `rwc`, the default: a file that is gone by now would be made anew, empty.
-        uri = f"{path.resolve().as_uri()}?mode=rw"
-        with closing(sqlite3.connect(uri, uri=True, timeout=BUSY_MS / 1000)) as connection:
+        with closing(sqlite3.connect(path, timeout=BUSY_MS / 1000)) as connection:
             connection.set_progress_handler(lambda: time.monotonic() > until_s, _CHECK_INSTRUCTIONS)
             found = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
     except sqlite3.Error as error:

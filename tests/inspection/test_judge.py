@@ -101,6 +101,14 @@ def test_two_images_of_one_count_of_the_gripper_prove_no_growth():
     assert Reason.GROWTH_OVER_LIMIT in far.reasons, "a count further it is evidence"
 
 
+def test_two_images_of_one_count_of_the_gripper_show_no_onset():
+    recipe = recipe_with("blueberry", {8: 149}, 18.6, (190, 24.8))
+    press = Press(16.0, 0.4, (point(7.96, 99.7), point(8.0, 100.0)), resolution_mm=0.374)
+    assert Reason.AREA_NOT_RISING in judge(press, recipe).reasons
+    whole = replace(press, points=(*(point(float(step), 12.5 * step) for step in range(4, 8)), *press.points))
+    assert Reason.AREA_NOT_RISING not in judge(whole, recipe).reasons
+
+
 def test_a_soft_fruit_fails_with_value_limit_and_closing():
     verdict = judge(pressed(48), STRAWBERRY)
     assert verdict.outcome == "FAIL"

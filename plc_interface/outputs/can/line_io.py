@@ -215,17 +215,17 @@ class LineIo:
     async def _beat(self) -> None:
         """Send the station's heartbeat from this loop: if the loop hangs, the heartbeat stops, as it has to."""
         while True:
-            if self._link:
-                self._send_beat(self._link)
+            if self._healthy and self._link:
+                try:
+                    self._send_beat(self._link)
+                except InterfaceError:
+                    self._counters["send_errors"] += 1
             await asyncio.sleep(self._settings.heartbeat_s)
 
     def _send_beat(self, link: CanLink) -> None:
         if not self._healthy:
-            return
-        try:
-            link.send(HEARTBEAT + self._settings.station_node, bytes([_OPERATIONAL]))
-        except InterfaceError:
-            self._counters["send_errors"] += 1
+            raise _HealthEndedError(messages.UNHEALTHY())
+        link.send(HEARTBEAT + self._settings.station_node, bytes([_OPERATIONAL]))
 
     async def _keep_up(self) -> None:
         pause_s = self._settings.retry_s
@@ -295,12 +295,12 @@ class LineIo:
             await self._order(link, node, "PRE-OPERATIONAL", _PRE_OPERATIONAL)
         await self._in_worker(lambda: bring_up.configure_encoder(encoder, settings))
         await self._in_worker(lambda: bring_up.configure_gate(gate, settings))
-        # The gate watches the station from the first heartbeat after this configuration (CiA 301). One is sent now, so
-        # that it watches before it becomes operational.
-        self._send_beat(link)
         for node in (encoder, gate):
             if standing := await self._in_worker(lambda node=node: bring_up.active_error(node)):
                 self._on_emergency(Emergency(node.number, *standing))
+            # The gate watches the station from the first heartbeat after its configuration (CiA 301). One is sent just
+            # before the order, so that it is never operational for a station that has gone.
+            self._send_beat(link)
             await self._order(link, node, "OPERATIONAL", _OPERATIONAL)
 
     async def _order(self, link: CanLink, node: bring_up.Node, name: str, state: int) -> None:
