@@ -26,7 +26,7 @@ AT_MM = 0.03
 An area at its growth limit changes by 1.2 mm² over this, a quarter of what repeating an image changes it by."""
 
 _WINDOW_POINTS = 4
-"""Of which the median of pairwise slopes bears one that is wrong."""
+"""The fewest of which the median of the pairwise slopes bears a wrong one, if it is not the first or the last."""
 _WINDOW_MM = 2.0
 LOWER_BOUNDS = {Flag.CUT_BY_BORDER, Flag.LOWER_BOUND}
 """Flags of an area that the contact surely reaches."""
