@@ -137,10 +137,11 @@ class Interface:
     def _beat(self) -> None:
         if not self.alive:
             return
+        asked_s = self._clock.s
         self._request(
             lambda answer: answer(self._machine.station.report()),
             SETTINGS.station_lost_after_s / 3,
-            lambda state: self.feed(ev.Beat(self._at(), state)),
+            lambda state: self.feed(ev.Beat(self._at(), state, asked_s)),
             lambda: None,
         )
         self._clock.after(SETTINGS.beat_period_s, self._beat)

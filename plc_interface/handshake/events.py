@@ -66,6 +66,8 @@ class Beat(Event):
     """The station answered a beat."""
 
     station: StationState
+    asked_s: float
+    """When the beat was sent, on the monotonic clock: the state may be as old."""
 
 
 @dataclass(frozen=True, slots=True)

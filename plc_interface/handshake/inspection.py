@@ -10,6 +10,7 @@ from plc_interface.handshake.outcomes import is_sound, no_result, publish_if_oth
 from plc_interface.handshake.trigger import note_refusal
 from plc_interface.handshake.work import Work, described, row
 from station.channel.line import BeginReply, Reason, Refusal, StationState
+from station.vocabulary import PackmlState
 
 
 def request_begin(work: Work) -> None:
@@ -45,6 +46,7 @@ def run(work: Work, sequence: int, pending: RequestBegin, deadline_s: float) -> 
     within_s = deadline_s + work.settings.result_margin_s
     state.pending = None
     state.acquiring = True
+    _await_news(work, PackmlState.STARTING)
     state.running = running(pending, sequence, work.at, within_s, station)
     if state.taken == sequence:
         state.taken = 0  # what runs has no outcome yet: the PLC's number was wrong, or of another station
@@ -54,6 +56,17 @@ def run(work: Work, sequence: int, pending: RequestBegin, deadline_s: float) -> 
     work.update_journal(accepted_id=pending.trigger_id, highest=sequence)
     work.start(Signal.RESULT_DEADLINE, within_s)
     work.actions.append(RequestOutcome(sequence, within_s))
+
+
+def _await_news(work: Work, packml_state: PackmlState | None) -> None:
+    """Take the station for not ready, in a PackML state, until a beat that is sent from now on reports its state.
+
+    Else a loss of the beats alone would show the readiness of before the trigger, with the jaws on the fruit.
+    """
+    state = work.state
+    state.news_from_s = work.at.s
+    if state.station is not None:
+        state.station = state.station.model_copy(update={"ready": False, "packml_state": packml_state})
 
 
 def running(
@@ -80,6 +93,7 @@ def refuse_as_answered(work: Work) -> None:
     """Refuse with the station's reason."""
     event = work.event
     begun = event.begun if isinstance(event, BeginAnswered) else BeginReply()
+    _await_news(work, work.state.station.packml_state if work.state.station else None)
     refuse_pending(work, begun.refusal or Refusal.NOT_READY)
     if begun.refusal is Refusal.BUSY:
         work.signals.append(Signal.STATION_BUSY)
@@ -104,6 +118,7 @@ def refuse_as_lost(work: Work) -> None:
     pending = work.state.pending
     # The station may have begun it, and its arm may be on the way to the fruit.
     work.state.acquiring = True
+    _await_news(work, None)
     if pending is not None:
         # Only this journal has the refusal: without it a start after a loss of power would adopt the inspection.
         work.durable = True

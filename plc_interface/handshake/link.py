@@ -30,6 +30,10 @@ def store_state(work: Work) -> None:
     if station.boot != state.last_boot:
         state.last_boot = station.boot
         state.station_boots = (state.station_boots + 1) % 2**16
+    if work.event.asked_s < state.news_from_s:
+        # It was sent before the last trigger was answered, so its readiness may be that of before the inspection.
+        packml_state = None if state.station is None else state.station.packml_state
+        station = station.model_copy(update={"ready": False, "packml_state": packml_state})
     state.station = station
     if station.packml_state is PackmlState.IDLE:
         state.acquiring = state.running is not None  # what the PLC waits for is ended by its outcome first

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from math import inf
 from typing import Any, NamedTuple
 
 from plc_interface.handshake.actions import RequestBegin
@@ -110,6 +111,9 @@ class State:
     last_failure: str = ""
     """Of a request, as logged; empty since the station answered `Resume`."""
 
+    news_from_s: float = -inf
+    """When a trigger was last answered, or its answer lost, on the monotonic clock: a beat that was sent before says
+    nothing of what the station does since."""
     acquiring: bool = True
     """The station may be at the fruit in the nest; after a start this is unknown until a beat reports IDLE."""
 

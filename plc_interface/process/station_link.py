@@ -117,6 +117,7 @@ class StationLink:
         deadline_s = max(2 * period_s, self._settings.station_lost_after_s / 3)
         while True:
             self._beat_now.clear()
+            asked_s = now().s
             try:
                 state = await self._client.request(self._line(), StationState, deadline_s=deadline_s)
             except ChannelError as error:
@@ -125,7 +126,7 @@ class StationLink:
                 self._logged = str(error)
             else:
                 self._logged = ""
-                self._feed(ev.Beat(now(), state))
+                self._feed(ev.Beat(now(), state, asked_s))
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(period_s):
                     await self._beat_now.wait()

@@ -84,6 +84,7 @@ class Rig:
                     recipe_number=3, recipe_checksum=0xCAFE, error_code=0, simulated=True,
                     alarms=sum(1 << number - 1 for number in self.alarms),
                 ),
+                now().s,
             )
         )  # fmt: skip
 

@@ -74,6 +74,7 @@ def test_laws_hold_over_a_thousand_triggers():
         ),
         (5467, 49, False, [("channel", "intermittent", 91.248, 1.446), ("channel", "delayed", 93.068, 1.72)]),
         (170, 1, True, [("interface", "kill", 1.352, 1.169)]),
+        (2214, 12, True, [("channel", "intermittent", 19.886, 13.18), ("arm", "safety_fault", 20.205, 0.319)]),
     ],
     ids=[
         "a connection cut and made again within a scan arms again",
@@ -82,6 +83,7 @@ def test_laws_hold_over_a_thousand_triggers():
         "an outcome of the interface's own that a full disk kept from the journal is not made anew",
         "a trigger that arrives after the interface has given it up begins nothing",
         "what was begun by a trigger whose answer was lost is no accepted fruit",
+        "what the station reported before an inspection does not make it ready after",
     ],
 )
 def test_a_story_that_broke_a_law_holds_them_now(seed, fruits, carries, troubles):

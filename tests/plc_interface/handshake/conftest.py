@@ -63,9 +63,13 @@ class Bench:
 
     def link(self, opened: Open | None = None, **changes: Any) -> tuple[do.Action, ...]:
         """A beat, and the answer to its request."""
-        self.feed(ev.Beat, self.station_state(**changes))
+        self.beat(**changes)
         assert self.state.open_request is not None
         return self.feed(ev.OpenAnswered, self.state.open_request, opened or Open(running=None, outcomes=()))
+
+    def beat(self, *, asked_s: float | None = None, **changes: Any) -> tuple[do.Action, ...]:
+        """The station's state, by a beat that was sent just now or at another time."""
+        return self.feed(ev.Beat, self.station_state(**changes), self.now_s if asked_s is None else asked_s)
 
     def armed(self, *bits: str) -> None:
         self.feed(ev.WriterGranted)

@@ -61,7 +61,7 @@ class Play:
         drawn = self.rng.random()
         if drawn < 0.16:
             self.boot += self.rng.random() < 0.05
-            return ev.Beat(self.at(), self.station())
+            return ev.Beat(self.at(), self.station(), self.at().s)
         return self.rare() if drawn < 0.26 else self.write()
 
     def answer(self) -> ev.Event | None:

@@ -7,7 +7,7 @@ from plc_interface.handshake.journal import Journal
 from plc_interface.handshake.modes import Link
 from plc_interface.handshake.view import view
 from plc_interface.registers.map import BY_NAME
-from station.channel.line import BeginReply, Open, PackmlState, Refusal
+from station.channel.line import PACKML_STATE_NUMBERS, BeginReply, Open, PackmlState, Reason, Refusal
 
 GETTING_READY = (None, PackmlState.CLEARING, PackmlState.STOPPED, PackmlState.RESETTING)
 
@@ -20,7 +20,7 @@ def status(made):
 
 def beat(made, packml_state, **changes):
     """Feed a beat, and return the status."""
-    made.feed(ev.Beat, made.station_state(packml_state=packml_state, **changes))
+    made.beat(packml_state=packml_state, **changes)
     return status(made)
 
 
@@ -120,6 +120,43 @@ def test_a_fruit_whose_trigger_the_station_may_have_begun_stays(bench, lost):
     assert made.state.last_refusal is Refusal.STATION_LOST
     assert "acquiring" in status(made)
     assert "acquiring" not in beat(made, PackmlState.IDLE, boot="2")
+
+
+@pytest.mark.parametrize("beats", ["lost", "late"])
+def test_what_the_station_reported_before_an_inspection_is_not_its_state_after_the_outcome(bench, beats):
+    """Found by story 2214: the beats were lost, and a stop with closed jaws had `trigger_ready` beside its outcome."""
+    made = at_rest(bench)
+    sent_s = made.now_s
+    made.now_s += 0.1
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=41, deadline_s=2.0))
+    made.now_s += 0.1
+    made.feed(ev.OutcomeReceived, made.outcome("NO_RESULT", Reason.ARM_FAULT))
+    made.write("enable", acknowledged_sequence=41)
+    if beats == "late":
+        beat(made, PackmlState.IDLE, asked_s=sent_s)
+    assert "acquiring" in status(made)
+    assert "trigger_ready" not in status(made)
+    assert view(made.state)["packml_state"] == PACKML_STATE_NUMBERS[PackmlState.STARTING]
+    assert "trigger_ready" not in beat(made, PackmlState.ABORTED, ready=False)
+    now = beat(made, PackmlState.IDLE)
+    assert "trigger_ready" in now
+    assert "acquiring" not in now
+
+
+@pytest.mark.parametrize("answer", ["lost", "refused"])
+def test_a_trigger_that_is_not_accepted_ends_the_readiness_until_the_next_beat(bench, answer):
+    made = at_rest(bench)
+    made.write("enable", "trigger", trigger_id=7)
+    if answer == "lost":
+        made.feed(ev.BeginFailed, made.state.pending.number)
+    else:
+        made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(refusal=Refusal.NOT_READY))
+    assert "trigger_ready" not in status(made)
+    assert view(made.state)["packml_state"] == (PACKML_STATE_NUMBERS[PackmlState.IDLE] if answer == "refused" else 0)
+    if answer == "lost":
+        made.link(packml_state=PackmlState.IDLE)
+    assert "trigger_ready" in beat(made, PackmlState.IDLE)
 
 
 @pytest.mark.parametrize("state", [PackmlState.STARTING, PackmlState.EXECUTE])

@@ -93,7 +93,7 @@ def test_starts_and_heartbeats_wrap_round_at_16_bits(bench, before, after):
     made = bench()
     made.link()
     made.state.station_boots = made.state.heartbeat = before
-    made.feed(ev.Beat, made.station_state())
+    made.beat()
     assert made.state.heartbeat == after
     made.link(boot="2")
     assert made.state.station_boots == after

@@ -26,7 +26,7 @@ def test_starts_of_the_station_are_counted_modulo_65536(bench):
     made.feed(ev.WriterGranted)
     made.link()
     made.state.station_boots = 65535
-    made.feed(ev.Beat, made.station_state(boot="2"))
+    made.beat(boot="2")
     assert made.state.station_boots == 0
 
 
@@ -137,7 +137,7 @@ def test_a_request_that_fails_with_each_beat_is_logged_once(bench):
     made.actions.clear()
     for what in ("the records are damaged", "the records are damaged", "no answer", "no answer"):
         made.feed(ev.RequestFailed, what)
-        made.feed(ev.Beat, made.station_state())
+        made.beat()
     assert [each.text.rpartition(": ")[2] for each in made.of(do.Log)] == ["the records are damaged", "no answer"]
     made.feed(ev.OpenAnswered, made.state.open_request, Open(running=None, outcomes=()))
     made.feed(ev.RequestFailed, "no answer")
@@ -146,7 +146,7 @@ def test_a_request_that_fails_with_each_beat_is_logged_once(bench):
 
 def test_a_question_for_what_is_open_that_failed_is_put_again_at_the_next_beat(bench):
     made = bench()
-    made.feed(ev.Beat, made.station_state())
+    made.beat()
     number = made.state.open_request
     made.feed(ev.RequestFailed, "it gave no answer")
     made.link()

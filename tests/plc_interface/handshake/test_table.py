@@ -91,7 +91,7 @@ def test_a_sequence_given_twice_is_refused(bench):
 def test_an_inspection_that_the_station_does_not_know_any_more_is_no_result(bench):
     made = bench()
     made.run()
-    made.feed(ev.Beat, made.station_state(boot="2"))
+    made.beat(boot="2")
     made.feed(ev.OpenAnswered, made.state.open_request, Open(running=None, outcomes=()))
     assert made.state.queue[0].reasons == (Reason.STATION_LOST,)
     assert made.state.link is Link.UP
@@ -102,7 +102,7 @@ def test_an_outcome_that_comes_late_is_answered_with_what_stands(bench):
     made.run()
     for passed_s in (0.9, 0.9, 0.5):
         made.now_s += passed_s
-        made.feed(ev.Beat, made.station_state())
+        made.beat()
     (late,) = made.state.queue
     assert (late.outcome, late.reasons, late.late) == ("NO_RESULT", (Reason.LATE,), True)
     assert late.duration_ms == 2300
@@ -153,14 +153,14 @@ def test_what_the_station_begins_after_its_trigger_was_refused_is_aborted(bench)
     made.link(packml_state=PackmlState.IDLE)
     assert "acquiring" not in status(made), "it has not started when it reports its state and what is open"
     made.actions.clear()
-    made.feed(ev.Beat, made.station_state(packml_state=PackmlState.EXECUTE))
+    made.beat(packml_state=PackmlState.EXECUTE)
     assert "acquiring" in status(made)
-    made.feed(ev.Beat, made.station_state(packml_state=PackmlState.EXECUTE))
+    made.beat(packml_state=PackmlState.EXECUTE)
     [request] = made.of(do.RequestOpen)
     made.feed(ev.OpenAnswered, request.number, Open(running=(41, 7), outcomes=()))
     assert [action.outcome.sequence for action in made.of(do.NotifyPublished)] == [41]
     assert (made.state.link, made.state.queue, made.state.journal.acknowledged) == (Link.UP, (), 41)
-    made.feed(ev.Beat, made.station_state(packml_state=PackmlState.EXECUTE))
+    made.beat(packml_state=PackmlState.EXECUTE)
     assert len(made.of(do.RequestOpen)) == 1, "its fingers are still opening"
 
 
@@ -174,11 +174,11 @@ def test_an_accepted_fruit_asks_for_nothing_after_a_trigger_that_was_lost(bench,
     made.write("enable")
     made.write("enable", "trigger", trigger_id=8)
     made.actions.clear()
-    made.feed(ev.Beat, made.station_state(packml_state=reports))
+    made.beat(packml_state=reports)
     made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=42, deadline_s=2.0))
-    made.feed(ev.Beat, made.station_state(packml_state=reports))
+    made.beat(packml_state=reports)
     made.feed(ev.OutcomeReceived, made.outcome(sequence=42, trigger_id=8))
-    made.feed(ev.Beat, made.station_state(packml_state=reports))
+    made.beat(packml_state=reports)
     assert made.of(do.RequestOpen) == []
 
 
@@ -211,7 +211,7 @@ def test_what_was_open_before_an_acceptance_does_not_end_it(bench):
     made.armed()
     made.write("enable", "trigger", trigger_id=7)
     made.feed(ev.RequestFailed, "a note was lost")
-    made.feed(ev.Beat, made.station_state())
+    made.beat()
     request_before = made.state.open_request
     made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=41, deadline_s=1.0))
     made.feed(ev.OpenAnswered, request_before, Open(running=None, outcomes=()))

@@ -164,6 +164,7 @@ class Laws:
         self._bits_fall_in_time(event, before, after, actions)
         self._acknowledgement(event, before, after, due=due)
         self._acquiring(event, before, after)
+        self._readiness(event, before, after)
         self._counters(before, after)
 
     def _link(self, event: ev.Event, before: State, after: State, actions: Any, *, silent: bool) -> None:
@@ -304,6 +305,14 @@ class Laws:
             assert now, "the fruit may be moved while the station may be at it"
         elif reports is not PackmlState.IDLE:
             assert now or not before.acquiring, "the fruit may be moved, and no beat has reported so"
+
+    @staticmethod
+    def _readiness(event: ev.Event, before: State, after: State) -> None:
+        ready = after.station is not None and after.station.ready
+        if (before.pending is not None and after.pending is None) or (before.running is None and after.running):
+            assert not ready, "what the station reported before the trigger was answered passes for its readiness"
+        if not isinstance(event, ev.Beat):
+            assert not ready or (before.station is not None and before.station.ready), "no beat has reported so"
 
     def _counters(self, before: State, after: State) -> None:
         counters = after.counters

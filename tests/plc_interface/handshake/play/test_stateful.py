@@ -494,7 +494,7 @@ class Handshake(RuleBasedStateMachine):
         while self.now_s < end_s:
             self.now_s = min(end_s, self.now_s + 0.5)
             if beats and self.station.up:
-                self.feed(ev.Beat(self.at(), self.station.state()))
+                self.feed(ev.Beat(self.at(), self.station.state(), self.now_s))
             self.feed(ev.Tick(self.at()))
             for request in [request for request in self.pending if request.expires_s <= self.now_s]:
                 if request in self.pending:
@@ -505,7 +505,7 @@ class Handshake(RuleBasedStateMachine):
     @rule()
     def beat(self) -> None:
         if self.station.up:
-            self.feed(ev.Beat(self.at(), self.station.state()))
+            self.feed(ev.Beat(self.at(), self.station.state(), self.now_s))
 
     @rule(ready=st.booleans())
     def output_changed(self, ready: bool) -> None:
