@@ -269,7 +269,7 @@ def _lines(counts: Mapping[str, Sequence[Count]], areas: Sequence[Mapping[str, S
         "changes in the frame alone, as light ages; all else in frame and reference alike, since it is the camera, the",
         "storage or the geometry. The twin's fruit, sound and bruised, are measured as by the station: three frames a",
         "step, doubted as far as they disagree. Of soft bodies each image is the mean of three frames, whose agreement",
-        "is not used. On the twin's seeds nothing was chosen but the least confidence itself.",
+        "is not used. Only the least confidence was chosen on these seeds of the twin.",
         "",
         "| least confidence | " + " | ".join(f"{title}: wrong | judged" for title in titles.values()) + " |",
         "|---" * 7 + "|",
