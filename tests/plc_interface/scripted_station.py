@@ -52,6 +52,11 @@ class ScriptedStation:
         self.command_gate = asyncio.Event()
         self.command_gate.set()
         self.command_done = CommandDone(done=True, why=None)
+        self.stopped = False
+        """Stopped with its jaws closed: not ready, whatever runs."""
+        self.report_gate = asyncio.Event()
+        """While it is clear, a report of the state is held back after it was made."""
+        self.report_gate.set()
         self.deaf = False
         self.lost_waits = 0
         """So many requests for an outcome to come get no answer, as if it had been lost on its way."""
@@ -153,12 +158,12 @@ class ScriptedStation:
 
     async def _line(self, request: Line) -> StationState:
         self.lines.append(request)
-        return StationState(
+        state = StationState(
             boot=f"boot {self.boots}",
             healthy=self.healthy,
-            ready=self.running is None,
+            ready=self.running is None and not self.stopped,
             why_not_ready=None,
-            packml_state=self.packml_state,
+            packml_state=PackmlState.ABORTED if self.stopped else self.packml_state,
             mode=1,
             recipe_number=3,
             recipe_checksum=0x12345678,
@@ -166,6 +171,8 @@ class ScriptedStation:
             alarms=1 << 63 | 1 << 32 | 0b101,
             simulated=True,
         )
+        await self.report_gate.wait()
+        return state
 
     async def _command(self, request: Command) -> CommandDone:
         self.commands.append(request)

@@ -22,7 +22,8 @@ def test_a_fruit_from_enable_to_acknowledge(cell, until, order):
             await plc.arm("buffer_results")
             seen = await plc.trigger(4711, encoder=70_000)
             assert {"online", "inspecting", "acquiring", "simulated", "writer_owned"} <= seen["status"]
-            assert (seen["accepted_trigger_id"], seen["packml_state"], seen["active_recipe"]) == (4711, "execute", 3)
+            assert (seen["accepted_trigger_id"], seen["packml_state"], seen["active_recipe"]) == (4711, "starting", 3)
+            await plc.wait("inspecting", packml_state="execute")
             assert seen["alarms"] == {"alarm_1", "alarm_3"}
             assert (await plc.group("more_status"))["alarms_33_to_64"] == {"alarm_33", "alarm_64"}
             assert seen["result_deadline_ms"] == 60_300
@@ -473,6 +474,32 @@ def test_a_note_that_is_spoilt_on_its_way_is_given_again(cell, until):
             station.spoilt_notes = 1
             await plc.write(acknowledged_sequence=101)
             await until(lambda: station.acknowledged == 101)
+
+    asyncio.run(scenario())
+
+
+def test_a_report_of_before_the_trigger_that_comes_after_the_outcome_makes_no_station_ready(cell, until):
+    async def scenario():
+        async with cell() as made:
+            station, plc = made.station, await made.plc()
+            station.packml_state = PackmlState.IDLE
+            await plc.arm()
+            station.report_gate.clear()
+            reports = len(station.lines)
+            await until(lambda: len(station.lines) > reports)
+            await plc.trigger(4711)
+            station.stopped = True
+            station.finish("NO_RESULT", Reason.ARM_FAULT)
+            seen = await plc.wait("result_valid")
+            assert "trigger_ready" not in seen["status"]
+            await plc.write(acknowledged_sequence=seen["result_sequence"])
+            station.report_gate.set()
+            while len(station.lines) < reports + 3:
+                seen = await plc.read()
+                assert "trigger_ready" not in seen["status"]
+                assert "acquiring" in seen["status"]
+            station.stopped = False
+            await plc.wait("trigger_ready", without="acquiring")
 
     asyncio.run(scenario())
 
