@@ -1,6 +1,12 @@
 """Chromium under test: its arguments, and a click that waits for its page."""
 
-from playwright.sync_api import Locator
+import contextlib
+import time
+
+from playwright.sync_api import Error, Locator
+
+_PATIENCE_S = 30.0
+_LOOK_AGAIN_MS = 10
 
 _WITHOUT = (
     # They keep a process ready for the address bar's suggestions: half a second of a core for each window.
@@ -26,6 +32,19 @@ ARGUMENTS = (
 
 
 def follow(lead: Locator) -> None:
-    """Click what leads to another page, and wait until that is loaded, which Playwright's own click does not."""
-    with lead.page.expect_navigation():
-        lead.click()
+    """Click what leads to another page, and wait until that is loaded, which Playwright's own click does not.
+
+    Not by `expect_navigation`: a page whose state has changed loads itself anew, and where the click calls that off,
+    Playwright takes it for the click's own navigation, which failed.
+    """
+    page = lead.page
+    before = page.evaluate("performance.timeOrigin")
+    lead.click()
+    deadline_s = time.monotonic() + _PATIENCE_S
+    while True:
+        with contextlib.suppress(Error):  # the document is being replaced
+            origin, state = page.evaluate("[performance.timeOrigin, document.readyState]")
+            if origin != before and state == "complete":
+                return
+        assert time.monotonic() < deadline_s, f"no page came after {page.url}"
+        page.wait_for_timeout(_LOOK_AGAIN_MS)
