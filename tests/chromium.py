@@ -2,8 +2,9 @@
 
 import contextlib
 import time
+from collections.abc import Callable
 
-from playwright.sync_api import Error, Locator
+from playwright.sync_api import Error, Locator, Page
 
 _PATIENCE_S = 30.0
 _LOOK_AGAIN_MS = 10
@@ -38,13 +39,18 @@ def follow(lead: Locator) -> None:
     Playwright takes it for the click's own navigation, which failed.
     """
     page = lead.page
-    before = page.evaluate("performance.timeOrigin")
+    before, _ = _until(page, lambda _origin, _state: True)
     lead.click()
+    _until(page, lambda origin, state: origin != before and state == "complete")
+
+
+def _until(page: Page, reached: Callable[[float, str], bool]) -> tuple[float, str]:
+    """Wait for a document by the time of its origin and its state, and return these."""
     deadline_s = time.monotonic() + _PATIENCE_S
     while True:
         with contextlib.suppress(Error):  # the document is being replaced
             origin, state = page.evaluate("[performance.timeOrigin, document.readyState]")
-            if origin != before and state == "complete":
-                return
-        assert time.monotonic() < deadline_s, f"no page came after {page.url}"
+            if reached(origin, state):
+                return origin, state
+        assert time.monotonic() < deadline_s, f"no other page came after {page.url}"
         page.wait_for_timeout(_LOOK_AGAIN_MS)
