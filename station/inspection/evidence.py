@@ -207,7 +207,7 @@ class Evidence:
         """Return whether points, in the order of their closing, are not all of one count of the gripper."""
         # The width of an image on the way is interpolated: two of one count may be that count apart and read as a few
         # hundredths of a millimetre, over which a slope may have any value.
-        return len(points) > 1 and points[-1].closing_mm - points[0].closing_mm > self._press.resolution_mm / 2
+        return bool(points) and points[-1].closing_mm - points[0].closing_mm > self._press.resolution_mm / 2
 
     def _begins_at_mm(self, points: Sequence[Measured]) -> float | None:
         # Medians, as for the growth: of five points or more a single wrong one hardly moves them.

@@ -96,6 +96,11 @@ def test_two_images_of_one_count_of_the_gripper_prove_no_growth():
     recipe = Recipe.model_validate_json(json.dumps(values))
     press = Press(16.0, 0.4, (point(4.20, 42.0), point(4.24, 46.0)), resolution_mm=0.374)
     assert judge(press, recipe).growth is None
+    for apart_mm, resolution_mm in ((0.15, 0.374), (0.25, 0.5)):  # less than half a count, and half of it
+        points = (point(4.5, 42.0), point(4.5 + apart_mm, 46.0))
+        assert judge(replace(press, points=points, resolution_mm=resolution_mm), recipe).growth is None
+    third = replace(press, points=(*press.points, point(4.60, 47.0)))
+    assert judge(third, recipe).growth, "the third is a count further"
     far = judge(replace(press, points=(point(4.20, 42.0), point(4.60, 58.0))), recipe)
     assert far.growth
     assert Reason.GROWTH_OVER_LIMIT in far.reasons, "a count further it is evidence"
