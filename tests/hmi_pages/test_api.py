@@ -11,8 +11,10 @@ import schemathesis
 from hypothesis import HealthCheck, assume, given, settings
 
 from hmi.web.roles import Role
+from station.messages.message import definition
 from station.records.audit_report import read_audit
 from station.records.database import reading as open_records
+from station.records.queries import read_inspection
 from station.vocabulary import LONGEST_LOT
 
 pytestmark = pytest.mark.timeout(400)
@@ -77,8 +79,13 @@ def test_results_are_found_by_their_reason_and_told_whole(orchard: Any, api: Any
     assert whole["reasons"] == [str(reason) for reason in soft.reasons]
     assert [each["text"] for each in whole["messages"]] == whole["explanation"]
     assert {each["id"].partition(".")[0] for each in whole["messages"]} == {"judge"}
-    assert all(each["parameters"] for each in whole["messages"])
-    assert len(whole["curve"]) >= 3
+    for message in whole["messages"]:
+        known = definition(message["id"])
+        assert known is not None
+        assert message["parameters"].keys() == known.parameters.keys()
+    with open_records(orchard.home / "records") as connection:
+        stored = read_inspection(connection, soft.sequence, orchard.home / "records").judged.curve
+    assert [each["closing_mm"] for each in whole["curve"]] == [each.closing_mm for each in stored]
     assert whole["recipe"] == "strawberry"
     assert (whole["fruit_length_mm"], whole["size_class"]) == (48.0, 3)
     sound = api("GET", f"/api/v1/inspections/{orchard.fruit[0].sequence}", token=reading).body
