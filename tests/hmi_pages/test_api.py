@@ -84,8 +84,9 @@ def test_results_are_found_by_their_reason_and_told_whole(orchard: Any, api: Any
         assert known is not None
         assert message["parameters"].keys() == known.parameters.keys()
     with open_records(orchard.home / "records") as connection:
-        stored = read_inspection(connection, soft.sequence, orchard.home / "records").judged.curve
-    assert [each["closing_mm"] for each in whole["curve"]] == [each.closing_mm for each in stored]
+        stored = read_inspection(connection, soft.sequence, orchard.home / "records").judged
+    assert stored is not None
+    assert [each["closing_mm"] for each in whole["curve"]] == [each.closing_mm for each in stored.curve]
     assert whole["recipe"] == "strawberry"
     assert (whole["fruit_length_mm"], whole["size_class"]) == (48.0, 3)
     sound = api("GET", f"/api/v1/inspections/{orchard.fruit[0].sequence}", token=reading).body
