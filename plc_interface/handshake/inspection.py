@@ -108,7 +108,10 @@ def refuse_pending(work: Work, reason: Refusal) -> None:
 
 
 def refuse_reused_sequence(work: Work) -> None:
-    """Refuse as not ready: the station used a sequence twice."""
+    """Refuse as not ready, `acquiring`: the station used a sequence twice."""
+    # By its answer it has begun, so that its arm may be on the way to the fruit.
+    work.state.acquiring = True
+    _await_news(work, None)
     work.log("the station gave a sequence again, or a lower one: its records were changed; the trigger is refused")
     refuse_pending(work, Refusal.NOT_READY)
 

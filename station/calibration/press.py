@@ -72,7 +72,11 @@ class BallPress:
         self.reference: Image | None = None
 
     async def let_go(self) -> None:
-        """Open the jaws after a failure, whose cause matters more than their own; to the end, also when called off."""
+        """Open the jaws after a failure, whose cause matters more than their own; to the end, also when called off.
+
+        Raises:
+            asyncio.CancelledError: called off meanwhile; raised once the jaws are open.
+        """
         try:
             await release_to_the_end(self._rig)
         except StationError as error:

@@ -144,6 +144,16 @@ def test_what_the_station_reported_before_an_inspection_is_not_its_state_after_t
     assert "acquiring" not in now
 
 
+def test_a_fruit_whose_inspection_the_station_began_under_a_used_sequence_stays(bench):
+    made = at_rest(bench, Journal(highest=41))
+    made.write("enable", "trigger", trigger_id=7)
+    made.feed(ev.BeginAnswered, made.state.pending.number, BeginReply(sequence=41, deadline_s=2.0))
+    assert made.state.last_refusal is Refusal.NOT_READY
+    assert "acquiring" in status(made)
+    assert "trigger_ready" not in status(made)
+    assert "acquiring" not in beat(made, PackmlState.IDLE)
+
+
 @pytest.mark.parametrize("answer", ["lost", "refused"])
 def test_a_trigger_that_is_not_accepted_ends_the_readiness_until_the_next_beat(bench, answer):
     made = at_rest(bench)
