@@ -1,8 +1,8 @@
-"""Chromium under test: its arguments, and a click that waits for its page."""
+"""Chromium under test: its arguments, and a wait for the page that a click leads to."""
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from playwright.sync_api import Error, Locator, Page
 
@@ -32,16 +32,22 @@ ARGUMENTS = (
 """Headless, in a container, without what a person's browser does in its background."""
 
 
-def follow(lead: Locator) -> None:
-    """Click what leads to another page, and wait until that is loaded, which Playwright's own click does not.
+@contextlib.contextmanager
+def next_document(page: Page) -> Iterator[None]:
+    """Wait, at the end of the block, until what was done in it has brought another document, and that is loaded.
 
     Not by `expect_navigation`: a page whose state has changed loads itself anew, and where the click calls that off,
     Playwright takes it for the click's own navigation, which failed.
     """
-    page = lead.page
     before, _ = _until(page, lambda _origin, _state: True)
-    lead.click()
+    yield
     _until(page, lambda origin, state: origin != before and state == "complete")
+
+
+def follow(lead: Locator) -> None:
+    """Click what leads to another page, and wait until that is loaded, which Playwright's own click does not."""
+    with next_document(lead.page):
+        lead.click()
 
 
 def _until(page: Page, reached: Callable[[float, str], bool]) -> tuple[float, str]:

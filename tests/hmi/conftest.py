@@ -46,7 +46,7 @@ from station.settings.configuration import Configuration, load_configuration
 from station.settings.hmi import panel_endpoint
 from station.settings.plc import line_endpoint
 from station.twin.console import ask as ask_twin
-from tests.chromium import ARGUMENTS
+from tests.chromium import ARGUMENTS, follow, next_document
 from tests.eventually import PATIENCE_S, eventually
 from tests.hosts import fresh_host
 from tests.ports import free_ports
@@ -301,7 +301,7 @@ class Panel:
         """Hold a button until it has taken."""
         button = self.page.locator(selector).first
         button.hover()
-        with self.page.expect_navigation():
+        with next_document(self.page):
             self.page.mouse.down()
         self.page.mouse.up()
 
@@ -314,8 +314,7 @@ class Panel:
                 self.page.locator(f"[data-digit='{digit}']").click()
         else:
             self.page.fill("#pin", pin)
-        with self.page.expect_navigation():
-            self.page.locator("form[action='/people/log-in'] .button.main").click()
+        follow(self.page.locator("form[action='/people/log-in'] .button.main"))
 
     def overflow(self) -> int:
         """By how many pixels the page is wider than the screen."""
@@ -369,8 +368,7 @@ def people(cell: Cell, panel: Callable[..., Panel]) -> Cell:
         first.page.fill("input[name=name]", ADMIN)
         first.page.fill("#pin", ADMIN_PIN)
         first.page.fill("#again", ADMIN_PIN)
-        with first.page.expect_navigation():
-            first.page.locator("form[action='/people/begin'] .button.main").click()
+        follow(first.page.locator("form[action='/people/begin'] .button.main"))
         known = {ADMIN: {}}
     if OPERATOR not in known:
         admin = panel()
@@ -381,8 +379,7 @@ def people(cell: Cell, panel: Callable[..., Panel]) -> Cell:
         form.locator("input[name=name]").fill(OPERATOR)
         form.locator("select[name=role]").select_option("operator")
         form.locator("#their").fill(OPERATOR_PIN)
-        with admin.page.expect_navigation():
-            form.locator(".button.main").click()
+        follow(form.locator(".button.main"))
     return cell
 
 

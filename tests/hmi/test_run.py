@@ -9,7 +9,7 @@ from hmi.run import charts
 from hmi.web.translation import Locale
 from station.messages import states
 from station.vocabulary import LONGEST_LOT, Reason
-from tests.chromium import follow
+from tests.chromium import follow, next_document
 
 MM_A_PX = 25.4 * 10.1 / (1280**2 + 800**2) ** 0.5
 CAPITALS_PX = """(selector) => [...document.querySelectorAll(selector)].map((each) => {
@@ -160,7 +160,7 @@ def test_what_lies_on_the_screen_keeps_no_old_fruit_shown(ready, panel):
 def test_what_stops_has_to_be_held_and_works_by_keyboard(ready, operator, eventually):
     operator.open("/")
     stop = operator.page.get_by_role("button", name="Stop")
-    with operator.page.expect_navigation():
+    with next_document(operator.page):
         stop.focus()
         operator.page.keyboard.down("Enter")
     operator.page.keyboard.up("Enter")
@@ -195,7 +195,7 @@ def test_what_stops_by_a_screen_reader_which_can_only_click_takes_two_clicks(rea
     assert operator.page.evaluate("document.querySelectorAll('form[data-sent]').length") == 0
     assert ready.until(lambda _: True).ready, "one click stops nothing"
     stop.filter(has_not_text=again).wait_for()  # given up after seconds: the two clicks come in one go
-    with operator.page.expect_navigation():
+    with next_document(operator.page):
         stop.evaluate("button => { button.click(); button.click(); }")
     ready.until(lambda state: state.state == "stopped" and state.stopping)
     follow(operator.page.get_by_role("button", name="Start"))
