@@ -136,10 +136,10 @@ class RecipeEditor:
         if not base or (len(base) >= _SHORTEST_BASE and now.startswith(base.lower())):
             return
         seen = [each for each in self._store.history(file.recipe.name) if each.sha256.startswith(base.lower())]
-        told = {"recipe": file.recipe.name, "base": base[:12], "now": now[:12]}
+        words = {"recipe": file.recipe.name, "base": base[:12], "now": now[:12]}
         if seen and len(base) >= _SHORTEST_BASE:
-            raise ConflictError(messages.CHANGED_SINCE_IN(**told, changes=seen[-1].changes_to(file.recipe)))
-        raise ConflictError(messages.CHANGED_SINCE(**told))
+            raise ConflictError(messages.CHANGED_SINCE_IN(**words, changes=seen[-1].changes_to(file.recipe)))
+        raise ConflictError(messages.CHANGED_SINCE(**words))
 
     def _put(self, file: ValidFile, text: str, recipe: Recipe, action: str, person: Person) -> None:
         """Write a file and its audit entry: the entry first, so that no change is made without one.

@@ -16,10 +16,17 @@ from station.records.database import FILE_NAME, reading, records_folder
 from station.records.errors import RecordsError
 from station.settings.problems import SettingsError, shortened
 from station.settings.recipe import shipped_folder
+from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import content_sha256
 
 BASE = re.compile(r"^# base: sha256 ([0-9a-f]{64})\n", re.MULTILINE)
 """Line of an exported file with the version that it was exported of."""
+
+
+def text_with_base(text: str, base: Recipe | None) -> str:
+    """Return a recipe's text that names, in its first line, the version that it is based on; none for a new recipe."""
+    line = "" if base is None else f"# base: sha256 {content_sha256(base)}\n"
+    return line + BASE.sub("", text, count=1)
 
 
 class RecipeReader:
@@ -103,5 +110,4 @@ class RecipeReader:
         """
         state = self.state(name)
         text = state.valid_file.text if revision is None else self.revision(name, revision).text
-        base = "" if state.file is None else f"# base: sha256 {content_sha256(state.file.recipe)}\n"
-        return base + BASE.sub("", text, count=1)
+        return text_with_base(text, None if state.file is None else state.file.recipe)

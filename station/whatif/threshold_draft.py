@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from station.errors import BadInputError
+from station.recipe_store.reader import text_with_base
 from station.records.database import reading
 from station.records.marks import Mark
-from station.settings.recipe import find_recipe, recipe_files
+from station.settings.recipe import check_recipes, recipe_files
 from station.settings.recipe_model import Recipe
 from station.settings.recipe_text import with_values
 from station.whatif.limits import least_area_at, rate_interval
@@ -52,7 +53,8 @@ def draft_recipe(recipe: Recipe, best: Proposal, name: str, folder: Path | None)
     """Return the draft and its text: the limit replaces the one at its closing, else the next one, else the last.
 
     Earlier limits are lowered and later ones raised where necessary, since limits rise with the closing. The comment
-    behind each changed value says where the new one comes from.
+    behind each changed value says where the new one comes from, and the first line names the version that was changed,
+    so that an import notices a change meanwhile.
     """
     limits, limit = recipe.damage.area, round(best.limit_mm2, 1)
     marked = f"`station thresholds`: {len(best.good)} good and {len(best.bad)} bad fruit"
@@ -84,10 +86,10 @@ def draft_recipe(recipe: Recipe, best: Proposal, name: str, folder: Path | None)
     if recipe.early_stop.area_mm2 < limit:
         changes["early_stop.area_mm2"] = limit
         comments["early_stop.area_mm2"] = "the last limit"
-    for path in recipe_files(folder):
-        if find_recipe(path).name == recipe.name:
+    for path, present in check_recipes(recipe_files(folder)).recipes.items():
+        if present.name == recipe.name:
             text, proposed = with_values(path.read_text(encoding="utf-8-sig"), changes, str(path), comments)
-            return proposed, text
+            return proposed, text_with_base(text, present)
     raise BadInputError(f"recipe {name}: there is no file of it to write a draft from")
 
 

@@ -14,6 +14,7 @@ from station.inspection.fruit_size import FruitSize
 from station.inspection.judge import judge
 from station.inspection.press import Measured, Press
 from station.settings.recipe import find_recipe, load_recipe
+from station.settings.recipe_versions import content_sha256
 from station.vocabulary import Flag, Reason
 from station.whatif.limits import (
     Costs,
@@ -358,6 +359,11 @@ def test_the_proposed_limit_decides_on_every_fruit(
     damage = load_recipe(file).damage
     assert (damage.decided_by, len(damage.area)) == (drafted, 2)
     assert damage.area[1].area_mm2 < 130
+    code, output = station("recipes", "import", file, "--who", "Ida", "--reason", "marked fruit")
+    assert code == 0, output
+    assert load_recipe(tmp_path / "site" / "strawberry.yaml").damage == damage
+    code, output = station("recipes", "import", file, "--who", "Ida", "--reason", "again")
+    assert (code, "it was changed since" in output) == (1, True), output
 
 
 def test_no_comment_of_the_draft_is_of_a_value_before(orchard, station, tmp_path, monkeypatch):
@@ -389,7 +395,9 @@ def test_no_comment_of_the_draft_is_of_a_value_before(orchard, station, tmp_path
     proposed = tmp_path / "proposed.yaml"
     code, output = station("thresholds", "--recipe", "raspberry", "--out", tmp_path / "out", "--draft", proposed)
     assert code == 0, output
-    before, after = (each.replace("  #", " #").splitlines() for each in (text, proposed.read_text()))
+    base, _, drafted = proposed.read_text().partition("\n")
+    assert base == f"# base: sha256 {content_sha256(pressed_by)}"
+    before, after = (each.replace("  #", " #").splitlines() for each in (text, drafted))
     marked = "`station thresholds`: 20 good and 8 bad fruit"
     changed = [new for old, new in zip(before, after, strict=True) if old != new]
     recipe = load_recipe(proposed)
@@ -450,6 +458,7 @@ def test_a_draft_of_several_limits_has_the_proposed_one_in_its_order(changed, tm
         early_stop__area_mm2=150.0,
     )
     (tmp_path / "strawberry.yaml").write_text(recipe.model_dump_json())
+    (tmp_path / "blueberry.yaml").write_text("half written: [")
     assert recipe.damage.size is not None
     exponent, limit_mm2 = recipe.damage.size.exponent, 61.0 + 10 * closing_mm
     best = Proposal(closing_mm, (), 0, exponent, None, np.ones(3), np.ones(3), limit_mm2, None)
