@@ -6,13 +6,14 @@ import itertools
 import os
 import shutil
 import sqlite3
+import sys
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
 from installer.layout import NAME, Layout, read_note
 from installer.messages import Failed, print_progress
-from installer.programs import LONG_S, own, station
+from installer.programs import LONG_S, run, station
 
 LAST_BACKUP = "last_backup"
 """An empty file of the home folder; its time is that of the last complete backup, which the station exports."""
@@ -25,12 +26,28 @@ LEFT_OUT = frozenset({"records", "run", "panel_jobs", "logs", LAST_BACKUP}) | _O
 A restore must not replace what is so now in the cell by what was so when the backup was made.
 """
 RECORDS, STATE, SETTINGS = "records", "state", "settings"
-DAILY = "daily-"
+DAILY, BEFORE_UPGRADE = "daily-", "before-upgrade-"
+"""The kinds of a backup: the first part of its folder's name."""
 DATABASE = Path("records.sqlite3")
+COPIED_TO = "copied to "
+"""Beginning of what the program `backup` says of a complete backup."""
+
+
+def make_backup_as_user(layout: Layout, release: Path, kind: str, keep: int) -> Path:
+    """Run a release's program `backup`, which goes on as the station's user, and return the backup's folder.
+
+    Raises:
+        Failed: as for `make_backup`.
+    """
+    program = (release / "venv" / "bin" / "python", "-B", release / "deploy" / "backup")
+    options = ("--root", layout.root, "--kind", kind, "--keep", str(keep))
+    output = run(*program, *options, environment=layout.environment(), limit_s=2 * LONG_S)
+    sys.stdout.write(output)
+    return layout.backups / Path(output.partition(COPIED_TO)[2].splitlines()[0]).name
 
 
 def make_backup(layout: Layout, release: Path, kind: str) -> Path:
-    """Back up records, state and configuration into a new folder; the station may run meanwhile.
+    """Back up records, state and configuration into a new folder, as the station's user; the station may run meanwhile.
 
     Another backup that is being made is awaited: each removes what an interrupted one has left.
 
@@ -56,7 +73,6 @@ def _make_backup(layout: Layout, release: Path, kind: str) -> Path:
     for left in layout.backups.glob(".*.partial"):
         shutil.rmtree(left, ignore_errors=True)
     partial.mkdir(mode=0o750)
-    own(layout, partial, NAME, NAME)
     has_records = (layout.home / RECORDS / DATABASE).exists()
     if has_records:
         station(layout, release, "records", "backup", partial / RECORDS, limit_s=LONG_S)
@@ -66,11 +82,15 @@ def _make_backup(layout: Layout, release: Path, kind: str) -> Path:
     _copied(layout.settings, partial / SETTINGS)
     if has_records and not (partial / RECORDS / DATABASE).exists():
         raise Failed(f"{partial} has no records, so there is no backup: somebody removed them; make another")
+    os.sync()  # else a power failure could leave the name on the disk and not the files
     partial.rename(copy)
-    # Made anew: where root makes the backup, it must not follow a link which the station's user has put there.
+    backups = os.open(layout.backups, os.O_RDONLY)
+    try:
+        os.fsync(backups)
+    finally:
+        os.close(backups)
     (layout.home / LAST_BACKUP).unlink(missing_ok=True)
     (layout.home / LAST_BACKUP).touch(exist_ok=False)
-    own(layout, layout.home / LAST_BACKUP, NAME, NAME)
     return copy
 
 

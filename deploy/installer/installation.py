@@ -7,14 +7,13 @@ from typing import NamedTuple
 
 from installer import backup, configuration, preflight, site_files
 from installer.health import LIMIT_S, ready, wait_until_healthy
-from installer.layout import Layout, point, read_note, target, write_note
+from installer.layout import NAME, Layout, point, read_note, target, write_note
 from installer.messages import Failed, Refused, print_progress
 from installer.release import ROOM_BYTES, STAMP, Packages, Source, complete, make
 from installer.rollback import roll_back
 from installer.services import Services
 
-BEFORE = "before-upgrade-"
-_COPIES_KEPT = 3
+_BACKUPS_KEPT = 3
 
 
 class Step(NamedTuple):
@@ -124,8 +123,9 @@ class Installation:
     def _make_backup(self) -> None:
         assert self._old is not None  # noqa: S101 (an upgrade has one)
         self._was_ready = self._services.running() and ready(self._layout, self._old)
-        copy = backup.make_backup(self._layout, self._old, BEFORE)
-        backup.prune(self._layout, BEFORE, _COPIES_KEPT, copy)
+        # Its disk may be a new one.
+        site_files.make_place(self._layout, self._layout.backups, NAME)
+        copy = backup.make_backup_as_user(self._layout, self.release, backup.BEFORE_UPGRADE, _BACKUPS_KEPT)
         note = {"from": self._old.name, "to": self.release.name}
         before = read_note(self._layout.upgrade)
         # An interrupted upgrade, also to another release, may have changed the file: the earlier note has it as before.

@@ -3,6 +3,7 @@
 import importlib.util
 import os
 import shutil
+import sys
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from installer.messages import Failed, Refused
 from installer.programs import station
 
 QUIET = timedelta(minutes=10)
+_HOMES = {"root", "home"}
+"""Folders of `/` that the unit's ProtectHome hides from the station."""
 _PROGRAMS = {"runuser": "util-linux", "systemctl": "systemd", "systemd-sysusers": "systemd", "userdel": "passwd"}
 
 
@@ -30,6 +33,12 @@ def check_machine(layout: Layout) -> None:
     missing = {package for program, package in _PROGRAMS.items() if layout.is_system and not shutil.which(program)}
     if missing:
         raise Refused(f"programs are missing: apt-get install {' '.join(sorted(missing))}")
+    for path in (Path(sys.executable), Path(sys.executable).resolve(), Path(sys.base_prefix).resolve()):
+        if layout.is_system and path.parts[1] in _HOMES:
+            raise Refused(
+                f"the station's user cannot run {path}: it is in a person's home. Install Python elsewhere, as "
+                "deploy/install says for Debian 13, and name it: PYTHON=/opt/python/.../bin/python3.12 deploy/install"
+            )
 
 
 def check_disk_space(layout: Layout, release_bytes: int, *, migrates: bool) -> None:

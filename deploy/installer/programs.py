@@ -52,6 +52,18 @@ def station(layout: Layout, release: Path, *arguments: str | Path, limit_s: floa
     return run(*command, environment=layout.environment(), folder=layout.program, limit_s=limit_s)
 
 
+def become_user(layout: Layout) -> None:
+    """Go on as the station's user where root runs this below `/`; for what works in folders that the user may write.
+
+    In those it could put links to any file for root to follow. There is no way back.
+    """
+    if layout.is_system and os.geteuid() == 0 and known_user():
+        user = pwd.getpwnam(NAME)
+        os.initgroups(NAME, user.pw_gid)
+        os.setgid(user.pw_gid)
+        os.setuid(user.pw_uid)
+
+
 def known_user() -> bool:
     """Return whether this system has the station's user."""
     try:

@@ -61,9 +61,7 @@ def put(layout: Layout, release: Path) -> None:
 def make_folders(layout: Layout, shipped: Path) -> None:
     """Create the folders of configuration, state and backups; a missing configuration with the shipped recipes."""
     for path, user in ((layout.settings, "root"), (layout.home, NAME), (layout.backups, NAME)):
-        make_folder(layout, path)
-        path.chmod(0o750)
-        own(layout, path, user, NAME)
+        make_place(layout, path, user)
     if not layout.configuration.exists():
         _make_recipes(layout, shipped)
         text = (layout.settings / "station.example.yaml").read_text(encoding="utf-8")
@@ -72,6 +70,13 @@ def make_folders(layout: Layout, shipped: Path) -> None:
         print_progress(f"{layout.configuration}: the site's own from now on; all but its recipes is commented out")
     layout.configuration.chmod(0o640)
     own(layout, layout.configuration, "root", NAME)
+
+
+def make_place(layout: Layout, folder: Path, user: str) -> None:
+    """Create a folder of a user, which the station's group may read."""
+    make_folder(layout, folder)
+    folder.chmod(0o750)
+    own(layout, folder, user, NAME)
 
 
 def _make_recipes(layout: Layout, shipped: Path) -> None:

@@ -5,6 +5,7 @@ import itertools
 import json
 import os
 import pwd
+import runpy
 import shutil
 import sqlite3
 import subprocess
@@ -153,6 +154,48 @@ def test_a_link_that_the_stations_user_put_there_is_not_followed(root, installed
     monkeypatch.setattr(programs, "known_user", lambda: True)
     monkeypatch.setattr(os, "geteuid", lambda: 0)
     programs.own(installer("layout").Layout(Path("/")), link, user, group)
+
+
+def test_root_backs_up_as_the_stations_user(root, installer, installed, monkeypatch, capsys):
+    """In the user's folders root would follow links to any file; the upgrade calls the same program."""
+    done, programs = [], installer("programs")
+    user = SimpleNamespace(pw_uid=990, pw_gid=991)
+    system = installer("layout").Layout(Path("/"))
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "geteuid", lambda: 0)
+        patch.setattr(programs, "known_user", lambda: True)
+        patch.setattr(programs.pwd, "getpwnam", lambda name: user if name == "fruit-station" else None)
+        for name in ("initgroups", "setgid", "setuid"):
+            patch.setattr(os, name, lambda *words, name=name: done.append((name, *words)))
+        programs.become_user(system)
+        assert done == [("initgroups", "fruit-station", 991), ("setgid", 991), ("setuid", 990)]
+        done.clear()
+        programs.become_user(installed)
+        assert not done, "in a scratch root there is no such user"
+
+    def make_backup(_layout, _release, kind):
+        done.append(kind)
+        return installed.backups
+
+    monkeypatch.setattr(programs, "become_user", lambda layout: done.append(layout.root))
+    monkeypatch.setattr(installer("backup"), "make_backup", make_backup)
+    monkeypatch.setattr(sys, "argv", ["backup", "--root", str(installed.root), "--kind", "before-upgrade-"])
+    assert runpy.run_path(str(root / "deploy/backup"))["main"]() == 0
+    assert done == [installed.root, "before-upgrade-"]
+    assert f"copied to {installed.backups}" in capsys.readouterr().out
+
+
+def test_a_backup_has_its_name_only_when_it_is_on_the_disk(installer, installed, monkeypatch):
+    seen = []
+
+    def sync():
+        (partial,) = installed.backups.iterdir()
+        seen.append((partial.name[0], (partial / "settings/station.yaml").is_file()))
+
+    monkeypatch.setattr(os, "sync", sync)
+    made = installer("backup").make_backup(installed, installed.current.resolve(), "daily-")
+    assert seen == [(".", True)]
+    assert made.name.startswith("daily-")
 
 
 def test_a_file_that_cannot_be_read_is_named(installer, installed, monkeypatch):
@@ -350,7 +393,7 @@ def upgraded(installed, installer, words, monkeypatch):
         text = layout.configuration.read_text().split()
         layout.configuration.write_text(" ".join(words.get(word, word) for word in text) + "\n")
 
-    def make_backup(layout, _release, kind):
+    def make_backup(layout, _release, kind, _keep):
         (copy := layout.backups / f"{kind}{next(numbers)}").mkdir()
         return copy
 
@@ -360,9 +403,9 @@ def upgraded(installed, installer, words, monkeypatch):
 
     monkeypatch.setattr(installer("configuration"), "try_with", changes)
     monkeypatch.setattr(installer("configuration"), "migrate", migrate)
-    monkeypatch.setattr(installer("backup"), "make_backup", make_backup)
+    monkeypatch.setattr(installer("backup"), "make_backup_as_user", make_backup)
     monkeypatch.setattr(installer("installation"), "make", make)
-    for name in ("put", "make_folder", "make_folders"):
+    for name in ("put", "make_folder", "make_folders", "make_place"):
         monkeypatch.setattr(installer("site_files"), name, lambda *_: None)
     return installed
 

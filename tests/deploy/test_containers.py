@@ -91,6 +91,19 @@ def test_what_is_mounted_is_there_and_what_is_written_is_a_volume(compose, root)
                 assert source in compose["volumes"], f"{name}: {mount}"
 
 
+def test_a_camera_has_the_hosts_name_by_which_the_station_finds_it(root):
+    (line,) = re.findall(r"#   devices: (\[.*\])", (root / "deploy/compose.yaml").read_text())
+    cameras = [each.split(":") for each in yaml.safe_load(line) if "video" in each]
+    assert [host for host, _ in cameras] == [container for _, container in cameras] != []
+
+
+def test_who_backs_up_a_container_is_said(compose, root):
+    section = (root / "docs/deployment.md").read_text().partition("\n## Containers\n")[2].partition("\n## ")[0]
+    assert not any("backup" in name for name in compose["services"])
+    assert "docker compose exec station station records backup " in section
+    assert "touch /var/lib/fruit-station/last_backup" in section
+
+
 def test_only_the_line_and_the_operators_are_let_in_and_from_loopback_unless_said(compose):
     published = {name: service["ports"] for name, service in compose["services"].items() if "ports" in service}
     assert published.keys() == {"station", "grafana"}

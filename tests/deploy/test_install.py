@@ -117,6 +117,15 @@ def test_a_machine_that_cannot_is_refused_with_the_remedy(tmp_path, installer, m
         with pytest.raises(refused, match="apt-get install passwd systemd util-linux"):
             checks.check_machine(layout(Path("/")))
     with monkeypatch.context() as patch:
+        patch.setattr(checks.os, "geteuid", lambda: 0)
+        patch.setattr(checks.shutil, "which", lambda name: f"/usr/bin/{name}")
+        patch.setattr(checks.sys, "executable", "/usr/bin/python3.12")
+        patch.setattr(checks.sys, "base_prefix", "/root/.local/share/uv/python/3.12")
+        with pytest.raises(refused, match=r"cannot run /root/\.local/share/uv/python/3\.12: it is in a person's home"):
+            checks.check_machine(layout(Path("/")))
+        patch.setattr(checks.sys, "base_prefix", "/usr")
+        checks.check_machine(layout(Path("/")))
+    with monkeypatch.context() as patch:
         patch.setattr(checks.shutil, "disk_usage", lambda _path: shutil._ntuple_diskusage(10**9, 9 * 10**8, 10**8))
         with pytest.raises(refused, match="has 100 MB of free space, 1500 MB are needed"):
             checks.check_disk_space(layout(tmp_path), installer("release").ROOM_BYTES, migrates=False)
@@ -173,6 +182,22 @@ def test_no_python_is_said_by_the_shell(tmp_path, root):
     )
     assert done.returncode == 2
     assert "apt-get install python3 python3-venv" in done.stderr
+    assert "UV_PYTHON_INSTALL_DIR=/opt/python pipx run uv python install 3.12" in done.stderr
+
+
+def test_a_python_that_uv_installed_is_run_where_it_is_and_not_by_its_link_in_a_home(tmp_path, root):
+    bin_folder, home, elsewhere = (tmp_path / name for name in ("bin", "home/.local/bin", "opt"))
+    for folder in (bin_folder, home, elsewhere):
+        folder.mkdir(parents=True)
+    for tool in ("dirname", "readlink", "sh"):
+        (bin_folder / tool).symlink_to(shutil.which(tool) or "")
+    program = elsewhere / "python3.12"
+    program.write_text('#!/bin/sh\n[ "$1" = -c ] || echo "$0"\n')
+    program.chmod(0o755)
+    (home / "python3.12").symlink_to(program)
+    environment = {"PATH": str(bin_folder), "HOME": str(tmp_path / "home")}
+    done = subprocess.run([root / "deploy/install"], env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, f"{program}\n"), done.stderr
 
 
 def test_a_part_of_the_project_is_no_source(tmp_path, root, install):

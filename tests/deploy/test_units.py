@@ -30,9 +30,11 @@ def booted(tmp_path, root) -> Path:
         shutil.copy(root / "deploy/systemd" / name, units)
     programs = tmp_path / "opt/fruit-station/current/venv/bin"
     programs.mkdir(parents=True)
-    for name in ("station", "python"):
-        (programs / name).write_text("#!/bin/sh\n")
-        (programs / name).chmod(0o755)
+    tools = tmp_path / "usr/bin"
+    tools.mkdir(parents=True)
+    for program in (programs / "station", programs / "python", tools / "systemd-tmpfiles"):
+        program.write_text("#!/bin/sh\n")
+        program.chmod(0o755)
     for target in Path("/usr/lib/systemd/system").glob("*.target"):
         (units / target.name).symlink_to(target)
     return tmp_path
@@ -75,6 +77,16 @@ def test_what_a_unit_may_is_little(root, name):
     assert found, done.stdout + done.stderr
     assert float(found[1]) <= MOST_EXPOSED
     assert done.returncode == 0
+
+
+@pytest.mark.parametrize("name", [name for name in UNITS if name.endswith(".service")])
+def test_a_unit_makes_itself_what_it_may_write(root, name):
+    """A folder of `ReadWritePaths` that is missing, as on a disk mounted over its parent, keeps a unit from running."""
+    service = unit(root, name)["Service"]
+    made = (root / "deploy/tmpfiles.d/fruit-station.conf").read_text()
+    for path in " ".join(service.get("ReadWritePaths", [])).split():
+        assert f"\nd {path} " in made
+        assert "+/usr/bin/systemd-tmpfiles --create fruit-station.conf" in service["ExecStartPre"]
 
 
 def test_the_units_times_leave_room_for_what_the_supervisor_mends_itself(root):

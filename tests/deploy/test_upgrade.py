@@ -83,7 +83,8 @@ def test_a_running_station_is_upgraded_or_left_as_it_was(
     assert form_of(layout) == form
     assert not layout.upgrade.exists()
 
-    # The same with its cause mended.
+    # The same with its cause mended, and a new disk at /var/backups.
+    shutil.rmtree(layout.backups)
     installation(layout, stand_in, "0.2.0").run()
     assert version() == "0.2.0"
     assert "logged_out_after_s: 60.0" in settings.read_text()
