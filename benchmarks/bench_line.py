@@ -68,10 +68,10 @@ def main() -> None:
         "decided a minute",
         "refused or no answer",
         "late",
-        "differences in the books",
-        "to decision, s: median, 95 %",
-        "wait before the nest, s: median, most",
-        "most that waited",
+        "differences",
+        "to decision, s: median, 95th percentile",
+        "wait in front of the nest, s: median, longest",
+        "longest queue",
     )
     rows = [row(kind, run, wrong, options.a_minute) for kind, (run, wrong) in runs.items()]
     pace_table = "\n".join([f"| {' | '.join(names)} |", "|---" * len(names) + "|", *rows])
@@ -80,8 +80,8 @@ def main() -> None:
 
 Written by `./run bench line`. Fruit arrive every {60 / options.a_minute:.1f} s, {DAMAGED_SHARE:.0%} of them damaged,
 and are inspected by the shipped recipes. If the nest is not free, a fruit waits in front of it: one that is centred
-or pressed twice may take longer than the pace, and others take less. *Books* are the PLC's readings, the records and
-the metrics. On the twin; unverified on hardware.
+or pressed twice may take longer than the pace, and others take less. *Differences* are those between the PLC's
+readings, the records and the metrics. On the twin; unverified on hardware.
 
 {pace_table}
 

@@ -221,8 +221,8 @@ interval (Wilson); milder damage and a patch, by the same procedure and judge: [
 
 {reasons(rows)}
 
-The damage is the twin's, the {SEVERITY} one: flesh that is softer and flatter where the gel touches. The thresholds
-were found on the same twin, so this shows that the whole chain works, not that real damage is found. Machine:
+The damage is simulated (*{SEVERITY}*): flesh that is softer and flatter where the gel touches. The limits were chosen
+on the same twin, so the page shows that the whole chain works, and not that real damage is detected. Machine:
 {os.cpu_count()} cores, {platform.machine()}, load average {os.getloadavg()[2]:.1f} over the last 15 minutes.
 """
 

@@ -24,8 +24,9 @@ INTRODUCTION = """\
 
 `./run bench` runs all of them but the long ones, one after the other, and writes this page; `--all` runs the long ones
 too, `--list` lists them, `./run bench NAME [OPTIONS]` runs one. Every figure is read from the page that its benchmark
-wrote, and its peers are from the same run: what is compared is the software, not two days of the machine. A load is an
-average of processes that want a core, or other programs' share of the cores, before or during the run.
+wrote. Its peers are from the same run, so that the machine's speed on another day makes no difference. A load is the
+average number of processes that use or wait for a core, or other programs' share of the cores, before or during the
+run.
 """
 
 
@@ -82,7 +83,7 @@ def markdown(runs: dict[str, dict[str, Any]]) -> str:
     for table in figures, pages:
         table.append("|---" * (table[0].count("|") - 1) + "|")
     for name, entry in BENCHMARKS.items():
-        page, ran = entry["page"], runs.get(name, {"date": "before runs were kept"})
+        page, ran = entry["page"], runs.get(name, {"date": "not recorded"})
         text = (ROOT / "docs" / page).read_text("utf-8")
         stated = load(text) or str(ran.get("load", "not stated"))
         for each in entry.get("figures", ()):

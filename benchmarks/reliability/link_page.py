@@ -57,7 +57,7 @@ def _played(made: Results, disturbed: Sequence[Fruit]) -> list[str]:
         f"  connection; {sum(bool(fruit.signs) for fruit in disturbed):,} of them showed a sign at the interface.",
         f"- {sum(fruit.bruised for fruit in fruits):,} of the fruits were bruised.",
         f"- {pace} triggers a minute of a station, with all waits for its recovery.",
-        f"- A person did {persons}, for {sum(bool(fruit.remedies) for fruit in fruits)} fruits.",
+        f"- Remedies by a person: {persons}; for {sum(bool(fruit.remedies) for fruit in fruits)} fruits.",
         f"- Machine: {os.cpu_count()} cores, {platform.machine()}, load average {os.getloadavg()[2]:.1f} over the last",
         "  15 minutes, with other work beside it.",
     ]

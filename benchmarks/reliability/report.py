@@ -13,8 +13,8 @@ _HEAD = """# Effect of faults on the fruit
 <!-- made by ./run bench faults -->
 
 Written by `./run bench faults`: the simulated cell, the station's process and the PLC interface as real processes
-under the supervisor, the line's PLC program on Modbus TCP. Each row starts a fault at a phase of one fruit's
-inspection, as visible from outside, ends it, and then inspects a good fruit. A row holds where
+under the supervisor, the line's PLC program on Modbus TCP. In each row a fault begins at a phase of one fruit's
+inspection, as seen from outside the station, and ends; then a good fruit is inspected. A row is passed if
 
 - the accepted trigger got exactly one result, with its own id, that never changed or came again,
 - the record in SQLite equals what the PLC read, and is acknowledged,
@@ -27,10 +27,11 @@ Phases: *trigger*: the PLC has read its trigger as accepted; *approach*: the arm
 the way; *closing*: the jaws close without a stop until they touch the fruit; *stepping*: the fruit is deformed by
 0.5 mm, in *sweep* while the jaws close on without a stop (`steps.measured: while_closing`); *releasing*: the PLC reads
 the result, and the arm leaves; *leaving*: the PLC has read its next trigger as accepted while the arm leaves the fruit
-before; the outcome is the second fruit's. So that faults meet these moments, the arm leaves ten times as slowly there,
-and the jaws close three times as slowly in *sweep*. Scenarios and their expected results:
-`tests/reliability/scenarios`. The station works with a quick recipe of 6 steps and a patience of 5; times are from the
-fault's end, or the last command, to ready for a trigger, on a machine with other work.
+before; the outcome is the second fruit's. To give the faults time in these phases, the arm leaves at a tenth of its
+speed there, and the jaws close at a third of theirs in *sweep*. Scenarios and their expected results:
+`tests/reliability/scenarios`. The station works with a quick recipe of 6 steps and a `service.patience` of 5, the
+factor on the expected times. *Ready again* is from the fault's end, or the last command, to ready for a trigger, on a
+machine with other work.
 
 """
 
@@ -46,11 +47,11 @@ def markdown(rows: Sequence[Row], scenarios: Sequence[Scenario]) -> str:
     held = sum(not row.wrong and not row.skipped for row in rows)
     skipped = sum(bool(row.skipped) for row in rows)
     lines = [
-        f"{len(rows)} rows: {held} hold, {len(rows) - held - skipped} do not, {skipped} could not be played.",
+        f"{len(rows)} rows: {held} passed, {len(rows) - held - skipped} failed, {skipped} could not be run.",
         f"Played: {_days(rows)}.",
-        "Rows played on an earlier day quote that day's wording.",
+        "Rows of an earlier day quote the messages of that day.",
         "",
-        "| fault | phase | outcome | alarms | ready again | holds |",
+        "| fault | phase | outcome | alarms | ready again | passed |",
         "|---|---|---|---|---|---|",
         *(_line(row, known[row.scenario]) for row in rows),
         "",

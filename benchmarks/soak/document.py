@@ -309,24 +309,25 @@ def page(samples: Sequence[Sample], ending: Ending, minutes: float, trouble: str
         "PLC's latency is that of a second client, which reads every 10 ms. Unverified on hardware."
     )
     worth = (
-        f"**{fruit} fruit**, {fruit / ran_min:.0f} a minute: a line at the shipped pace of {PACE_A_MINUTE} a minute "
-        f"lays so many in **{fruit / PACE_A_MINUTE / 60:.1f} hours**. What grows by the fruit is repeated so often; "
-        "what grows by the time, such as frames, heartbeats and streams, is as in any hour, and its slope is given for "
+        f"**{fruit} fruit**, {fruit / ran_min:.0f} a minute: a line at {PACE_A_MINUTE} fruit a minute needs "
+        f"**{fruit / PACE_A_MINUTE / 60:.1f} hours** for as many. What grows with each fruit is tested for that long; "
+        "what grows with time (frames, heartbeats, streams) for the run's own time. A slope is given for "
         f"an hour. To have more fruit, the jaws close at {CLOSING_MM_S} mm/s (shipped: 20); {DAMAGED_SHARE:.0%} of the "
         f"fruit are damaged, and the recipe changes every {BATCH} fruit. The records begin with {EARLIER} inspections, "
         f"eight hours at that pace, which PostgreSQL gets first. The images' quota is {QUOTA_MB} MB, and "
         f"{ACCEPTED_SHARE:.0%} of the passed fruit's are stored (shipped: 2 %): {removing}."
     )
     deciding = (
-        f"Nothing is decided over the warm-up, the first {WARM_UP_SHARE:.0%} ({after[0].at_s / 60:.0f} minutes). A "
-        "slope is the median of all pairs' (Theil, Sen), its interval widened by the series' own memory (Hamed, Rao). "
-        f"A verdict needs the whole interval on one side, and {DECIDES_S / 60:.0f} minutes; else it is *not decided*. "
-        f"Memory is what no other process shares (USS), and its slope that of the most in each {RETURN_S / 60:.0f} "
-        "minutes: once a minute the service returns what it has freed, and takes it again with the next fruit. *In "
-        "use* is what of it is not free in the C library's heap, whose chunks are counted from outside (of a heap that "
-        "cannot be walked, as the twin's, all counts), and its slope that of the least in each "
-        f"{RETURN_S / 60:.0f} minutes. A heap that had to reach further once, as more "
-        "happened at once, stays so large; what is not given back is in use."
+        f"The warm-up, the first {WARM_UP_SHARE:.0%} ({after[0].at_s / 60:.0f} minutes), is not judged. A slope is the "
+        "median of the slopes of all pairs (Theil, Sen); its interval is widened for the autocorrelation of the series "
+        "(Hamed, Rao). A verdict needs the whole interval on one side of the limit, and "
+        f"{DECIDES_S / 60:.0f} minutes of samples; else it is *not decided*. Memory is what no other process shares "
+        f"(USS); its slope is that of the largest value of each {RETURN_S / 60:.0f} minutes, since once a minute the "
+        "service returns freed memory and takes it again with the next fruit. *In use* is the part of it that is not "
+        "free in the C library's heap, whose chunks are counted from outside (of a heap that cannot be walked, as the "
+        f"twin's, all of it); its slope is that of the smallest value of each {RETURN_S / 60:.0f} minutes. A heap that "
+        "had to grow once, because more happened at the same time, keeps that size; memory that is never freed counts "
+        "as in use."
     )
     flat = (
         f"Flat is less than {MOST_PIECES_PER_HOUR:g} more in an hour; of latency and times, less than "
