@@ -70,7 +70,7 @@ class ImageStore:
     """Background writer of images; images that cannot be written are dropped and reported."""
 
     def __init__(self, folder: Path, settings: RecordsSettings, submit: Callable[[Work[Any]], Future[Any]]) -> None:
-        """Start the thread, which submits to the writer; it first reconciles files and rows."""
+        """Start the thread, which submits to the writer; it first reconciles files and rows, and makes space."""
         self.results: Counter[str] = Counter()
         self.size_bytes = 0
         self._folder = folder
@@ -114,8 +114,11 @@ class ImageStore:
         self._thread.join()
 
     def _run(self) -> None:
-        with contextlib.suppress(OSError, RecordsError, TimeoutError):  # tried again before images are written
+        with contextlib.suppress(OSError, StationError):  # tried again before images are written
             self._reconcile()
+            # Not only before images are written: below the reserve no inspection begins that could bring some.
+            if self.size_bytes:
+                self._make_space(0, accepted=False)
         while (work := self._queue.get()) is not None and not self._stopping.is_set():
             self._store(work)
             self._done += 1
@@ -170,7 +173,9 @@ class ImageStore:
         if needed_bytes > quota_bytes:
             raise _NotStoredError(messages.OVER_QUOTA(needed_bytes=needed_bytes, quota_bytes=quota_bytes))
         reserve_bytes = 2 * self._settings.free_reserve_mb * MB
-        while (over := self.size_bytes + needed_bytes > quota_bytes) or self._free_bytes() < reserve_bytes:
+        while not self._stopping.is_set() and (
+            (over := self.size_bytes + needed_bytes > quota_bytes) or self._free_bytes() < reserve_bytes
+        ):
             removed = self._record(lambda connection: remove_oldest_images(connection, for_accepted=accepted))
             if removed is None:
                 if over and accepted:

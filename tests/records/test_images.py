@@ -2,6 +2,7 @@
 
 import asyncio
 import errno
+import shutil
 import sqlite3
 import threading
 from dataclasses import replace
@@ -17,10 +18,13 @@ from sqlalchemy import event
 from station.messages import records as messages
 from station.messages.message import verbatim
 from station.records.database import FILE_NAME, open_engine
-from station.records.images import ImageStore, accepted_is_stored
+from station.records.errors import DiskFullError
+from station.records.holds import hold
+from station.records.images import MB, ImageStore, accepted_is_stored
 from station.records.migration import migrate
 from station.records.model import Image
 from station.records.retention import remove_oldest_images
+from tests.records.causes import because
 from tests.stored_inspection import read_record
 
 
@@ -130,6 +134,104 @@ def test_accepted_fruit_beyond_a_quota_that_is_full_of_rejected_ones_is_no_loss(
             await settled(records)
             assert read_record(records, number).images_state == messages.IMAGES_DROPPED(cause=messages.QUOTA_FULL())
             assert records.status().images == {"kept": 3, "over_quota": 1}
+
+    scenario(steps)
+
+
+@pytest.fixture
+def removed():
+    """Wait until so many images were removed since the opening."""
+
+    async def wait(records, number):
+        while records.status().images.get("removed", 0) < number:
+            await asyncio.sleep(0.005)
+
+    return wait
+
+
+def test_a_lowered_quota_is_kept_from_the_next_start_and_what_is_on_hold_stays(
+    opened, scenario, inspected, noise, settled, removed
+):
+    async def steps():
+        async with opened() as records:
+            numbers = [await inspected(records, noise(side_px=315)) for _ in range(3)]
+            await settled(records)
+            await records.change(lambda connection: hold(connection, numbers[1], "complaint", "ada"))
+        async with opened(images_quota_mb=0) as records:
+            await removed(records, 2)
+            states = [read_record(records, number).images_state for number in numbers]
+            assert states == [messages.IMAGES_REMOVED(), messages.IMAGES_KEPT(), messages.IMAGES_REMOVED()]
+            (held,) = read_record(records, numbers[1]).images
+            assert [str(file) for file in (records.folder / "images").glob("*/*")] == [held.path]
+            assert records.status().image_bytes == held.size_bytes
+
+    scenario(steps)
+
+
+def test_below_the_reserve_images_go_at_the_next_opening_so_that_inspections_begin_again(
+    opened, scenario, trigger, inspected, noise, settled, removed, folder, monkeypatch
+):
+    """An image is 0.3 MB, and the reserve 1 MB; images are removed until twice as much is free."""
+    space_mb = 9.0
+
+    def disk_usage(_path):
+        used_bytes = sum(file.stat().st_size for file in folder.glob("images/*/*"))
+        return shutil._ntuple_diskusage(10**9, 0, int(space_mb * MB) - used_bytes)
+
+    monkeypatch.setattr(shutil, "disk_usage", disk_usage)
+
+    async def steps():
+        nonlocal space_mb
+        async with opened(accepted_share=1.0) as records:
+            numbers = [await inspected(records, noise(side_px=315), accepted=accepted) for accepted in (0, 1, 0)]
+            await settled(records)
+            space_mb = 2.75
+            await records.reopen()
+            await removed(records, 1)
+            states = [read_record(records, number).images_state for number in numbers]
+            assert states == [messages.IMAGES_KEPT(), messages.IMAGES_REMOVED(), messages.IMAGES_KEPT()], (
+                "accepted first"
+            )
+            space_mb = 1.5
+            with pytest.raises(DiskFullError, check=because(messages.RESERVE_REACHED)):
+                await records.begin(trigger)
+            await records.reopen()
+            await removed(records, 2)
+            last = await inspected(records, noise())
+            await settled(records)
+            assert read_record(records, last).images_state == messages.IMAGES_DROPPED(cause=messages.DISK_NEARLY_FULL())
+
+    scenario(steps)
+
+
+def test_a_close_does_not_wait_until_all_images_too_many_are_removed(
+    opened, scenario, inspected, noise, settled, monkeypatch
+):
+    removing, gate = threading.Event(), threading.Event()
+    removals = []
+
+    def remove(_connection, *, for_accepted):
+        removing.set()
+        gate.wait(30)
+        removals.append(for_accepted)
+        return (0, []) if len(removals) < 20 else None
+
+    monkeypatch.setattr("station.records.images.remove_oldest_images", remove)
+    monkeypatch.setattr("station.records.records.IMAGES_CLOSE_S", 0.0)
+
+    async def steps():
+        async with opened() as records:
+            await inspected(records, noise())
+            await settled(records)
+        async with opened(images_quota_mb=0) as records:
+            images = records._opened.images
+            assert await asyncio.to_thread(removing.wait, 30)
+            closing = asyncio.create_task(records.close())
+            while not images._stopping.is_set():
+                await asyncio.sleep(0.005)
+            gate.set()
+            await closing
+        assert removals == [False]
 
     scenario(steps)
 
