@@ -157,12 +157,14 @@ class Writer:
         try:
             result = work(connection)
         except Exception as error:
-            told = map_error(error, self._place)
-            if isinstance(told, CONCERNING_ALL):
-                raise told from error  # SQLite may have undone all of it already, the savepoint too
+            found = map_error(error, self._place)
+            # SQLite may have undone all of it already, the savepoint too. An error that needed no mapping is no fault
+            # but the request's own refusal, as of a trigger below the reserve: the others are still carried out.
+            if isinstance(found, CONCERNING_ALL) and found is not error:
+                raise found from error
             connection.exec_driver_sql("ROLLBACK TO request")
             connection.exec_driver_sql("RELEASE request")
-            return told
+            return found
         connection.exec_driver_sql("RELEASE request")
         return result
 

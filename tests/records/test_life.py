@@ -1,7 +1,9 @@
 """The life of an inspection in the records, over restarts."""
 
 import asyncio
+import shutil
 import sqlite3
+import threading
 from dataclasses import replace
 from typing import Any
 
@@ -11,9 +13,16 @@ from hypothesis import strategies as st
 
 from station.channel.line import Outcome, Reason
 from station.messages import records as messages
-from station.records.errors import BadRecordError, LockedError, RecordsClosedError, UnknownInspectionError
+from station.records.errors import (
+    BadRecordError,
+    DiskFullError,
+    LockedError,
+    RecordsClosedError,
+    UnknownInspectionError,
+)
 from station.records.lots import read_lots, start_lot
 from station.records.model import AlarmEntry, StoredAlarm
+from station.records.write_requests import add_event
 from tests.records.causes import because
 from tests.stored_inspection import read_record
 
@@ -242,6 +251,36 @@ def test_one_bad_request_does_not_undo_its_neighbours(opened, scenario, trigger,
             assert len((await records.open_inspections()).running) == 2
 
     scenario(steps)
+
+
+def test_a_trigger_below_the_reserve_does_not_undo_its_neighbours(opened, scenario, trigger, folder, monkeypatch):
+    gate = threading.Event()
+
+    async def steps():
+        async with opened() as records:
+            holding = asyncio.create_task(records.change(lambda _: gate.wait(30)))
+            await asyncio.sleep(0)  # each of these is queued in its first step
+            monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(10**9, 10**9, 0))
+            answers = asyncio.gather(
+                records.change(lambda connection: add_event(connection, "before", None, {})),
+                records.begin(trigger),
+                records.change(lambda connection: add_event(connection, "after", None, {})),
+                return_exceptions=True,
+            )
+            await asyncio.sleep(0)
+            gate.set()
+            before, refused, after = await answers
+            await holding
+            assert (before, after) == (None, None)
+            assert isinstance(refused, DiskFullError)
+            assert refused.cause.id == messages.RESERVE_REACHED.id
+            assert (await records.open_inspections()).running == ()
+
+    scenario(steps)
+    with sqlite3.connect(folder / "records.sqlite3") as connection:
+        names = connection.execute("SELECT name FROM events WHERE name IN ('before', 'after')").fetchall()
+        assert names == [("before",), ("after",)]
+    connection.close()
 
 
 def test_clock_steps_change_no_order_and_no_duration(opened, scenario, trigger, passed):
