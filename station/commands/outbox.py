@@ -55,9 +55,10 @@ def status(config: Path | None) -> None:
         )
         connected = "connected" if each.connected else f"not connected: {each.error}"
         click.echo(f"{name}: {each.told} published, {waiting}{oldest}, {each.refused} refused; {connected}")
-    age_s = time.time() - said.utc_ms / 1000
-    if age_s > LOST_S:
-        raise StationError(f"the outbox was last heard {age_s:.0f} s ago; start `station run`, or `station outbox run`")
+    if said.age_s > LOST_S:
+        raise StationError(
+            f"the outbox was last heard {said.age_s:.0f} s ago; start `station run`, or `station outbox run`"
+        )
     if not all(each.connected for each in said.destinations.values()):
         raise StationError("not all destinations are connected; what waits is published when they are")
 

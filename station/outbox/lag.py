@@ -18,20 +18,23 @@ class OutboxMonitor:
     def __init__(self, settings: OutboxSettings, home: Path) -> None:
         self._settings, self._folder = settings, outbox_folder(home)
         self._enabled = settings.postgresql.enabled or settings.mqtt.enabled
-        self._began_s = time.monotonic()
+        self._seen_utc_ms: int | None = None
+        self._changed_s = time.monotonic()
 
     def alarm_detail(self) -> Message | None:
         """Return what is delayed; None for nothing, and if no destination is enabled."""
         if not self._enabled:
             return None
         status, now_s = read_status(self._folder), time.time()
-        silent_s = time.monotonic() - self._began_s
-        if status is not None:  # the status of an earlier start does not count
-            silent_s = min(silent_s, now_s - status.utc_ms / 1000)
+        # By the monotonic clock: after a clock was set back, the last status of a lost process would be a new one.
+        if status is not None and status.utc_ms != self._seen_utc_ms:
+            self._seen_utc_ms, self._changed_s = status.utc_ms, time.monotonic()
+        silent_s = time.monotonic() - self._changed_s
         if silent_s > LOST_S:
             return messages.SILENT(age_s=silent_s)
-        told = {} if status is None or now_s - status.utc_ms / 1000 > LOST_S else status.destinations
-        late = [found for name, each in told.items() if (found := self._late(name, each, now_s)) is not None]
+        # The status of an earlier start does not count.
+        destinations = {} if status is None or status.age_s > LOST_S else status.destinations
+        late = [found for name, each in destinations.items() if (found := self._late(name, each, now_s)) is not None]
         return joined(late) if late else None
 
     def _late(self, name: str, each: DestinationStatus, now_s: float) -> Message | None:

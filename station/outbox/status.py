@@ -42,6 +42,11 @@ class OutboxStatus(BaseModel):
     utc_ms: int
     destinations: dict[str, DestinationStatus]
 
+    @property
+    def age_s(self) -> float:
+        """Time since it was written, s; one from the future is of a clock that was set back since, and as old."""
+        return abs(utc_ms() - self.utc_ms) / 1000
+
 
 def outbox_folder(home: Path) -> Path:
     """Return the folder of the outbox's files."""

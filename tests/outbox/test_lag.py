@@ -3,10 +3,12 @@
 import asyncio
 import json
 import time
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from station.clock import utc_ms
 from station.inspection.alarm_table import AlarmId
 from station.messages import outbox as messages
 from station.outbox import lag
@@ -16,6 +18,7 @@ from station.outbox.status import DestinationStatus, outbox_folder, write_status
 from station.records.audit import AuditEntry
 from station.runtime.station import Station
 from station.settings.configuration import load_configuration
+from tests.command_line import call
 from tests.eventually import until
 from tests.ports import free_port
 
@@ -115,3 +118,34 @@ def test_a_process_that_says_nothing_any_more_is_an_alarm_too(site, monkeypatch)
     assert of.alarm_detail() is None
     monkeypatch.setattr(lag, "LOST_S", -1.0)
     assert messages.SILENT.id in ids(of.alarm_detail())
+
+
+@pytest.mark.parametrize("step_ms", [-3_600_000, 3_600_000])
+def test_a_stepped_clock_neither_hides_a_lost_process_nor_makes_one(site, monkeypatch, step_ms):
+    configuration = site()
+    folder, now_s, clock_ms = outbox_folder(configuration.home), 100.0, time.time_ns() // 1_000_000
+    clocks = SimpleNamespace(monotonic=lambda: now_s, time=lambda: clock_ms / 1000)
+    monkeypatch.setattr(lag, "time", clocks)
+    monkeypatch.setattr("station.outbox.status.utc_ms", lambda: clock_ms)
+    status = DestinationStatus(connected=True, told=1, refused=0, waiting=0, oldest_utc_ms=None, error=None)
+    monitor = OutboxMonitor(configuration.outbox, configuration.home)
+    now_s, clock_ms = now_s + lag.LOST_S, clock_ms + 30_000
+    write_status(folder, {"postgresql": status})
+    assert monitor.alarm_detail() is None
+    now_s, clock_ms = now_s + 1, clock_ms + 1_000 + step_ms
+    assert monitor.alarm_detail() is None, "it reported a second ago"
+    now_s, clock_ms = now_s + lag.LOST_S, clock_ms + 30_000
+    assert messages.SILENT.id in ids(monitor.alarm_detail())
+    write_status(folder, {"postgresql": status})
+    assert monitor.alarm_detail() is None, "it reports again"
+
+
+def test_the_status_command_reports_a_lost_process_after_the_clock_was_set_back(site, tmp_path, monkeypatch):
+    configuration = site()
+    status = DestinationStatus(connected=True, told=1, refused=0, waiting=0, oldest_utc_ms=None, error=None)
+    with monkeypatch.context() as patch:
+        patch.setattr("station.outbox.status.utc_ms", lambda: utc_ms() + 3_600_000)
+        write_status(outbox_folder(configuration.home), {"postgresql": status})
+    code, text = call("outbox", "status", "--config", tmp_path / "station.yaml")
+    assert code == 1
+    assert text.startswith("the outbox was last heard 3")

@@ -243,7 +243,7 @@ def _of_outbox(status: OutboxStatus) -> Iterator[Metric]:
         "outbox_connected": {(name,): each.connected for name, each in destinations},
         "outbox_waiting": {(name,): each.waiting for name, each in destinations},
         "outbox_lag": {(name,): age_s(each.waiting_since_utc_ms) for name, each in destinations},
-        "outbox_age": {(): age_s(status.utc_ms)},
+        "outbox_age": {(): status.age_s},
     }
     yield from _families(gauges, {"outbox_refused": {(name,): each.refused for name, each in destinations}})
 

@@ -158,6 +158,12 @@ def test_another_system_that_was_never_reached_is_behind_since_the_start(metrics
     assert lag_s(waiting=3, oldest_utc_ms=now_ms - 180_000, away_since_utc_ms=now_ms - 90_000) > 170
 
 
+def test_an_outbox_that_was_heard_before_the_clock_was_set_back_is_not_heard_now(metrics):
+    status = OutboxStatus(utc_ms=time.time_ns() // 1_000_000 + 3_600_000, destinations={})
+    metrics.watch_outbox(lambda: status)
+    assert scraped(metrics)["station_outbox_heard_age_seconds",] > 3000
+
+
 def test_a_link_that_is_never_heard_has_an_age_from_the_start(metrics, clock):
     metrics.heard("plc")
     clock.now_s += 3.0
