@@ -5,6 +5,8 @@ from typing import Literal
 
 LONGEST_LOT = 32
 """Characters of a lot's name at most, as in the PLC's registers."""
+LONGEST_GROWER = 64
+"""Characters of a grower's name at most."""
 
 OutcomeName = Literal["PASS", "FAIL", "NO_RESULT"]
 

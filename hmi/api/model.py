@@ -7,11 +7,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from hmi.past.past import FullRecord, judged_of
 from station.messages.message import Message
-from station.vocabulary import LONGEST_LOT, OutcomeName
+from station.vocabulary import LONGEST_GROWER, LONGEST_LOT, OutcomeName
 
 LotName = Annotated[str, Field(min_length=1, max_length=LONGEST_LOT, pattern=r"^[ -~]*[!-~][ -~]*$")]
 """Printable ASCII, as in the PLC's registers."""
-Grower = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+Grower = Annotated[str, Field(min_length=1, max_length=LONGEST_GROWER, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
 
 
 class Model(BaseModel):

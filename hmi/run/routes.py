@@ -35,6 +35,7 @@ from station.channel.panel_run import (
     Picture,
 )
 from station.charts.spark import spark
+from station.vocabulary import LONGEST_GROWER
 
 router = APIRouter()
 ENTRY = Entry("run", "/")
@@ -184,7 +185,7 @@ async def order(
     caller: Annotated[Caller, Depends(orders(Right.RUN))],
     order: Annotated[OperatorCommandName, Form()],
     argument: Annotated[str, Form(max_length=64)] = "",
-    grower: Annotated[str, Form(max_length=64)] = "",
+    grower: Annotated[str, Form(max_length=LONGEST_GROWER)] = "",
 ) -> Response:
     """Start, stop, cancel, recover, or begin and end a lot; the page shows the result."""
     if order not in _ORDERS:

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor
-from station.vocabulary import LONGEST_LOT, OutcomeName, Reason
+from station.vocabulary import LONGEST_GROWER, LONGEST_LOT, OutcomeName, Reason
 
 Text = Annotated[str, Field(max_length=64)]
 Why = Annotated[str, Field(min_length=1, max_length=1000)]
@@ -42,7 +42,7 @@ class StartLot(ChannelMessage):
     """Begin a lot. Idempotent; answered with `LotView`."""
 
     name: str = Field(min_length=1, max_length=LONGEST_LOT)
-    grower: str = Field(min_length=1, max_length=64)
+    grower: str = Field(min_length=1, max_length=LONGEST_GROWER)
     actor: Actor
 
 

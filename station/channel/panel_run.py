@@ -11,7 +11,7 @@ from pydantic import Field, JsonValue
 from station.channel.messages import ChannelMessage
 from station.channel.panel import Actor, ListedAlarm, RecoveryName
 from station.messages.message import Message
-from station.vocabulary import OutcomeName, PackmlState
+from station.vocabulary import LONGEST_GROWER, OutcomeName, PackmlState
 
 
 class OperatorCommandName(StrEnum):
@@ -46,7 +46,7 @@ class OperatorCommand(ChannelMessage):
     person: Actor
     order: OperatorCommandName
     argument: str = Field(default="", max_length=64)
-    grower: str = Field(default="", max_length=64)
+    grower: str = Field(default="", max_length=LONGEST_GROWER)
     """Of a lot that is started; may be empty."""
 
 

@@ -79,6 +79,7 @@ LOT_WITHOUT_INSPECTIONS = define("records.lot_without_inspections", "no inspecti
 BAD_LOT_NAME = define("records.bad_lot_name", "the lot {text} is no name")
 BAD_GROWER = define("records.bad_grower", "the grower {text} is no name")
 LONG_LOT_NAME = define("records.long_lot_name", "the lot's name has {letters} letters", letters=Number(0))
+LONG_GROWER = define("records.long_grower", "the grower's name has {letters} characters", letters=Number(0))
 ANOTHER_GROWER = define("records.another_grower", "lot {lot} is registered for {known}, not for {grower}")
 INSPECTION_NOT_HELD = define(
     "records.inspection_not_held", "the images of inspection {number} are not retained", number=Number(0)
@@ -235,6 +236,7 @@ LIST_SHOWS_LOTS = define("records.list_shows_lots", "`station records list` show
 REGISTER_LOT = define("records.register_lot", "register its start first: station records lot start")
 PRINTABLE_NAME = define("records.printable_name", "give one of printable letters")
 LONGEST_LOT_NAME = define("records.longest_lot_name", "the PLC gives at most {most}", most=Number(0))
+SHORTER_NAME = define("records.shorter_name", "give a name of at most {most} characters", most=Number(0))
 CORRECT_LOT = define(
     "records.correct_lot",
     "give the new lot another name, or correct it: station records lot start --correct",

@@ -50,6 +50,8 @@ _TABLES: dict[OutboxKind, tuple[LiteralString, tuple[LiteralString, ...], tuple[
 }
 """By kind: the table, its columns, and its key. A row that exists is updated to the station's present state; one of the
 audit trail never changes."""
+_ROW_FAULTS = (psycopg.DataError, psycopg.IntegrityError, psycopg.errors.ProgramLimitExceeded)
+"""Errors of a row, however often it is written; the last one is of a text that is too long for an index."""
 _RECIPES: LiteralString = (
     "INSERT INTO recipes SELECT DISTINCT ON (data->>'recipe_sha256') data->>'recipe_sha256', data->>'fruit', "
     "(data->>'recipe_number')::integer, data->>'recipe_revision', data->'recipe' FROM incoming "
@@ -142,7 +144,7 @@ class Session:
         """Write the entries after the position, and their position: all of it, or nothing."""
         try:
             await self._write(batch.events)
-        except (psycopg.DataError, psycopg.IntegrityError) as error:
+        except _ROW_FAULTS as error:
             log.warning("a row was refused, they are written one by one: %s", _first_line(error))
             await self._connection.rollback()
             await self._write_one_by_one(batch)
@@ -187,7 +189,7 @@ class Session:
                     await self._write((event,))
                     # Only the commit empties the table: the next event's statement would take this one again.
                     await self._connection.execute("DELETE FROM incoming")
-            except (psycopg.DataError, psycopg.IntegrityError) as error:
+            except _ROW_FAULTS as error:
                 self._owner.refused += 1
                 row = (self._station, batch.lineage[0].id, event.entry, event.kind, _first_line(error))
                 await self._connection.execute(

@@ -9,7 +9,7 @@ from station.records.audit import AuditEntry, append_audit
 from station.records.errors import RecordsError
 from station.records.schema import lots
 from station.records.write_requests import queue_event
-from station.vocabulary import LONGEST_LOT
+from station.vocabulary import LONGEST_GROWER, LONGEST_LOT
 
 
 def start_lot(connection: Connection, name: str, grower: str, by: tuple[str, str], *, correct: bool = False) -> LotView:
@@ -28,6 +28,9 @@ def start_lot(connection: Connection, name: str, grower: str, by: tuple[str, str
     if len(name) > LONGEST_LOT:
         raise RecordsError(messages.LONG_LOT_NAME(letters=len(name)), messages.LONGEST_LOT_NAME(most=LONGEST_LOT))
     known = _known(connection, name)
+    # A longer one may be from before there was this limit: its lot still starts again.
+    if len(grower) > LONGEST_GROWER and (known is None or known.grower != grower):
+        raise RecordsError(messages.LONG_GROWER(letters=len(grower)), messages.SHORTER_NAME(most=LONGEST_GROWER))
     if known is None:
         connection.execute(insert(lots).values(name=name, grower=grower, began_utc_ms=utc_ms(), revision=1))
     elif known.grower != grower:

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import os
+import random
 import signal
 import sqlite3
 import subprocess
@@ -118,12 +119,21 @@ def test_what_no_database_can_hold_is_kept_apart_and_nothing_waits_behind_it(ser
         database.execute("UPDATE inspections SET trigger_id = 5000000000 WHERE sequence = 2")
         database.execute("UPDATE inspections SET began_utc_ms = 9000000000000000 WHERE sequence = 3")
     database.close()
+    with short_transaction(tmp_path) as connection:
+        start_lot(connection, "long", "Meier", IDA)
+        start_lot(connection, "west", "Huber", IDA)
+        longer = random.Random(3).randbytes(3000).hex()  # than an index takes: an earlier version stored it
+        connection.exec_driver_sql("UPDATE lots SET grower = ? WHERE name = 'long'", (longer,))
     asyncio.run(publish_all(server, tmp_path, "odd"))
     found = rows(server, "SELECT sequence, lot FROM inspections WHERE station = 'odd' ORDER BY sequence")
     assert found == [(1, "nul\N{REPLACEMENT CHARACTER}inside"), (3, "L00000"), (4, "L00000")]
-    ((kind, entry, why),) = rows(server, "SELECT kind, entry, error FROM refused WHERE station = 'odd'")
+    query = "SELECT kind, data::jsonb->>'name', entry, error FROM refused WHERE station = 'odd' ORDER BY entry"
+    (kind, _, entry, why), (other_kind, name, _, other_why) = rows(server, query)
     assert (kind, entry) == ("inspection", 2)
     assert "out of range" in why
+    assert (other_kind, name) == ("lot", "long")
+    assert "index row" in other_why
+    assert rows(server, "SELECT name, grower FROM lots WHERE station = 'odd'") == [("west", "Huber")]
 
 
 def test_after_a_restoring_numbers_given_again_are_told(server, fill, tmp_path):

@@ -20,6 +20,7 @@ from station.records.search import Query, find, find_page
 from station.records.search_index import HOUR_MS
 from station.records.short_transaction import short_transaction
 from station.records.write_requests import conclude, insert_trigger, publish
+from station.vocabulary import LONGEST_GROWER
 from tests.records.causes import because
 
 IDA = ("Ida", "operator")
@@ -186,6 +187,29 @@ def test_the_command_finds_by_what_was_told_of_lots(opened, scenario, folder, ru
         trail = connection.exec_driver_sql(query).all()
     assert [row.action for row in trail] == ["lot.told", "lot.told", "lot.ended"]
     assert trail[1][:3] == ("ada", "lot.told", '{"grower":"Meier"}')
+
+
+def test_a_growers_name_is_as_long_as_the_panel_takes_it_except_one_that_is_stored(
+    opened, scenario, folder, run_records
+):
+    async def steps():
+        async with opened():
+            pass
+
+    scenario(steps)
+    assert run_records("lot", "start", "west", "--grower", "M" * LONGEST_GROWER).exit_code == 0
+    longer = "M" * (LONGEST_GROWER + 1)
+    for correct in ((), ("--correct",)):
+        refused = run_records("lot", "start", "west", "--grower", longer, *correct)
+        assert refused.exit_code == 1
+        assert refused.exception.cause == messages.LONG_GROWER(letters=LONGEST_GROWER + 1)
+        assert refused.exception.remedy == messages.SHORTER_NAME(most=LONGEST_GROWER)
+    with short_transaction(folder) as connection:
+        (lot,) = read_lots(connection, 9)
+        assert lot.grower == "M" * LONGEST_GROWER
+        connection.exec_driver_sql("UPDATE lots SET grower = ?", (longer,))  # as an earlier version stored it
+    assert run_records("lot", "end", "west").exit_code == 0
+    assert run_records("lot", "start", "west", "--grower", longer).output.startswith(f"west: {longer}, began ")
 
 
 def test_a_lot_that_is_started_again_runs_until_it_is_ended_again(opened, scenario, folder):
