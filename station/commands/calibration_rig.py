@@ -52,7 +52,7 @@ async def open_rig(
             await _wait_for_enter(f"lay the ball {where}, then press Enter")
 
     async with contextlib.AsyncExitStack() as stack:
-        stack.callback(os.close, _lock(site))
+        stack.callback(os.close, lock_devices(site))
         camera = camera_from(site.camera)
         stack.push_async_callback(camera.close)
         await camera.open()
@@ -91,8 +91,12 @@ async def _wait_for_enter(request: str) -> None:
         raise asyncio.CancelledError
 
 
-def _lock(site: Configuration) -> int:
-    """Take the lock that a station has while it runs."""
+def lock_devices(site: Configuration) -> int:
+    """Take the lock that a station has while it runs; closing the descriptor releases it.
+
+    Raises:
+        CalibrationError: a station runs, or another program has the devices.
+    """
     try:
         return lock_folder(records_folder(site.home))
     except LockedError as error:

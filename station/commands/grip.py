@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import csv
+import os
 from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
@@ -12,6 +13,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from station.commands.calibration_rig import lock_devices
 from station.commands.signals import on_end_signals
 from station.config_option import config_option
 from station.devices.arm.ur import ARM_READY_S, UrArm
@@ -41,7 +43,8 @@ _COLUMNS = ("image", "width_mm", "commanded_width_mm", "object_state", "current_
 def grip(recipe_name: str, out: Path, config: Path | None, bench: bool) -> None:  # noqa: FBT001 (click's way)
     """Grip one fruit by a recipe's width steps, without a judgement. The arm and the gripper move.
 
-    Writes reference/, frames/ and widths.csv with the measured widths, and truth/ with the twin's camera.
+    The station must not run meanwhile. Writes reference/, frames/ and widths.csv with the measured widths, and truth/
+    with the twin's camera.
     """
     configuration = load_configuration(config)
     recipe = find_recipe(recipe_name, configuration.recipes_folder)
@@ -59,14 +62,15 @@ def grip(recipe_name: str, out: Path, config: Path | None, bench: bool) -> None:
 
 async def _grip(configuration: Configuration, recipe: Recipe, recording: "_Recording", *, bench: bool) -> None:
     called_off = _cancelled_by_signal()
-    camera = camera_from(configuration.camera)
     async with contextlib.AsyncExitStack() as stack:
+        stack.callback(os.close, lock_devices(configuration))
+        camera = camera_from(configuration.camera)
         stack.push_async_callback(camera.close)
         await camera.open()
         gripper = make_gripper(configuration.gripper)
         stack.push_async_callback(gripper.close)
         arm = None
-        if not bench:
+        if not (bench or configuration.service.bench):
             arm = await stack.enter_async_context(UrArm(configuration.arm))
             await arm.ready(ARM_READY_S)
 

@@ -110,11 +110,12 @@ def test_nothing_is_verified_without_a_calibration_of_this_very_unit(site):
     assert "calibrated are: D11111: is this the right sensor?" in done.stderr
 
 
-def test_a_running_station_keeps_its_devices(site):
+def test_a_running_station_keeps_its_devices(site, tmp_path):
     lock = lock_folder(site.home / "records")
     try:
-        for command in ("calibrate", "verify"):
-            done = site.station(command, "--yes")
+        grip = ("grip", "--recipe", "rubber_ball", "--out", tmp_path / "grip")
+        for command in (("calibrate", "--yes"), ("verify", "--yes"), grip):
+            done = site.station(*command)
             assert done.returncode == 1
             assert "the devices are in use" in done.stderr
             assert "stop the station" in done.stderr

@@ -48,6 +48,7 @@ def started_cells(folder: Path) -> Iterator[Callable[..., Cell]]:
         host = fresh_host()
         configuration = folder / f"station_{len(cells)}.yaml"
         configuration.write_text(
+            f"home: home_{len(cells)}\n"
             f"arm: {{host: {host}}}\n"
             "gripper: {answer_timeout_s: 2.0, move_margin_s: 8.0, "
             f"urcap: {{host: {host}}}, modbus_rtu: {{host: {host}}}}}\n"
