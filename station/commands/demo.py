@@ -95,6 +95,11 @@ def _refuse_real_devices(site: Configuration) -> None:
         "camera.twin.host": site.camera.twin.host,
     }
     real = [f"{name} is {host}" for name, host in hosts.items() if not host.startswith("127.")]
+    rtu = site.gripper.modbus_rtu
+    if site.gripper.driver == "modbus_rtu" and rtu.line == "serial":
+        real.append(f"gripper.modbus_rtu.serial_port is {rtu.serial_port}")
+    if site.can.enabled and site.can.real_bus:
+        real.append(f"can.channel is {site.can.channel}")
     if site.camera.driver != "twin":
         real.append(f"camera.driver is {site.camera.driver}")
     if real:

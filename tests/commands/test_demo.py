@@ -93,8 +93,21 @@ def test_a_second_one_names_the_process_whose_address_is_in_use_and_ctrl_c_ends_
     assert psutil.wait_procs(children, timeout=10)[1] == []
 
 
-def test_a_site_with_real_devices_is_refused(demo):
-    process = demo(STATION_ARM_HOST="192.0.2.7")
+@pytest.mark.parametrize(
+    ("variables", "device"),
+    [
+        ({"ARM_HOST": "192.0.2.7"}, "arm.host is 192.0.2.7"),
+        (
+            {"GRIPPER_DRIVER": "modbus_rtu", "GRIPPER_MODBUS_RTU_LINE": "serial"},
+            "gripper.modbus_rtu.serial_port is /dev/ttyUSB0",
+        ),
+        ({"CAN_ENABLED": "true", "CAN_INTERFACE": "socketcan", "CAN_CHANNEL": "can0"}, "can.channel is can0"),
+    ],
+)
+def test_a_site_with_real_devices_is_refused(demo, tmp_path, variables, device):
+    # Without recipes a demonstration that is not refused ends at once, too.
+    variables = {"RECIPES_FOLDER": str(tmp_path / "none"), **variables}
+    process = demo(**{f"STATION_{name}": value for name, value in variables.items()})
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 2
-    assert errors.startswith("station: the demonstration works with the twin only, but arm.host is 192.0.2.7")
+    assert errors.startswith(f"station: the demonstration works with the twin only, but {device}: unset")
