@@ -14,6 +14,7 @@ from station.calibration.rig import Place, Progress, Unit
 from station.commands.signals import on_end_signals
 from station.devices.arm.ur import ARM_READY_S, UrArm
 from station.devices.camera.open import camera_from
+from station.devices.gripper.interface import Gripper
 from station.devices.gripper.robotiq import make_gripper
 from station.errors import BadInputError
 from station.records.database import records_folder
@@ -49,7 +50,7 @@ async def open_rig(
             where = (
                 f"{place.x_mm:g} mm to the right and {place.y_mm:g} mm down, as the image shows it, of its first place"
             )
-            await _wait_for_enter(f"lay the ball {where}, then press Enter")
+            await wait_for_enter(f"lay the ball {where}, then press Enter")
 
     async with contextlib.AsyncExitStack() as stack:
         stack.callback(os.close, lock_devices(site))
@@ -66,16 +67,23 @@ async def open_rig(
             arm = await stack.enter_async_context(UrArm(site.arm))
             await arm.ready(ARM_READY_S * site.service.patience)
             await stack.enter_async_context(renewed_lease(arm))
+
+        async def activate() -> None:
+            if yes:  # else it was, with empty jaws, and the ball may be between them by now
+                await gripper.activate()
+
         if not yes:
+            await activate_emptied(gripper)
             ball = f"the {site.calibration.ball_mm:g} mm ball lies in its holder"
-            await _wait_for_enter(
+            await wait_for_enter(
                 f"the jaws will move: see that the gel is clean, {ball}, and hands are away; then press Enter"
             )
         unit = Unit(description.serial, description.name, simulated=site.camera.driver != "digit")
-        yield CalibrationRig(Cell(camera, gripper, arm), recipe, lay, site.service.patience), unit, recipe
+        cell = Cell(camera, gripper, arm)
+        yield CalibrationRig(cell, recipe, lay, activate, site.service.patience), unit, recipe
 
 
-async def _wait_for_enter(request: str) -> None:
+async def wait_for_enter(request: str) -> None:
     """Wait for a person's Enter; Ctrl-C ends the wait, and the end of the input cancels the run."""
     click.echo(request)
     loop, line = asyncio.get_running_loop(), asyncio.Event()
@@ -89,6 +97,18 @@ async def _wait_for_enter(request: str) -> None:
         loop.remove_reader(sys.stdin)
     if not sys.stdin.readline():
         raise asyncio.CancelledError
+
+
+async def activate_emptied(gripper: Gripper) -> bool:
+    """Activate a gripper that needs it once a person has emptied its jaws; return whether it did."""
+    if not (await gripper.read()).needs_activation:
+        return False
+    await wait_for_enter(
+        "the gripper is not activated, and its jaws will travel their whole way: take out what is between them, see "
+        "that hands are away; then press Enter"
+    )
+    await gripper.activate()
+    return True
 
 
 def lock_devices(site: Configuration) -> int:

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from station.commands.calibration_rig import lock_devices
+from station.commands.calibration_rig import activate_emptied, lock_devices, wait_for_enter
 from station.commands.signals import on_end_signals
 from station.config_option import config_option
 from station.devices.arm.ur import ARM_READY_S, UrArm
@@ -40,7 +40,14 @@ _COLUMNS = ("image", "width_mm", "commanded_width_mm", "object_state", "current_
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder for the frames; must not exist.")
 @config_option
 @click.option("--bench", is_flag=True, help="No arm: the fruit is already between the fingers.")
-def grip(recipe_name: str, out: Path, config: Path | None, bench: bool) -> None:  # noqa: FBT001 (click's way)
+@click.option("--yes", is_flag=True, help="Do not ask: a gripper that is not activated may travel its whole way.")
+def grip(
+    recipe_name: str,
+    out: Path,
+    config: Path | None,
+    bench: bool,  # noqa: FBT001 (click passes arguments by name)
+    yes: bool,  # noqa: FBT001
+) -> None:
     """Grip one fruit by a recipe's width steps, without a judgement. The arm and the gripper move.
 
     The station must not run meanwhile. Writes reference/, frames/ and widths.csv with the measured widths, and truth/
@@ -50,7 +57,7 @@ def grip(recipe_name: str, out: Path, config: Path | None, bench: bool) -> None:
     recipe = find_recipe(recipe_name, configuration.recipes_folder)
     recording = _Recording(out)
     try:
-        asyncio.run(_grip(configuration, recipe, recording, bench=bench))
+        asyncio.run(_grip(configuration, recipe, recording, bench=bench, yes=yes))
     except asyncio.CancelledError:
         raise click.Abort from None
     click.echo(
@@ -60,7 +67,9 @@ def grip(recipe_name: str, out: Path, config: Path | None, bench: bool) -> None:
     )
 
 
-async def _grip(configuration: Configuration, recipe: Recipe, recording: "_Recording", *, bench: bool) -> None:
+async def _grip(
+    configuration: Configuration, recipe: Recipe, recording: "_Recording", *, bench: bool, yes: bool
+) -> None:
     called_off = _cancelled_by_signal()
     async with contextlib.AsyncExitStack() as stack:
         stack.callback(os.close, lock_devices(configuration))
@@ -75,6 +84,8 @@ async def _grip(configuration: Configuration, recipe: Recipe, recording: "_Recor
             await arm.ready(ARM_READY_S)
 
         async with renewed_lease(arm):
+            while not yes and await activate_emptied(gripper):  # it may lose its power again while a person is there
+                await wait_for_enter("put the fruit in its place, take your hands away; then press Enter")
             await press(DeviceRig(Cell(camera, gripper, arm), recipe), recipe, _Observer(recipe, camera, recording))
     if called_off.is_set():  # too late to be cut short
         raise asyncio.CancelledError

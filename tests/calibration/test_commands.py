@@ -11,6 +11,11 @@ from station.records.open import lock_folder
 
 pytestmark = pytest.mark.timeout(600)
 
+EMPTY = "take out what is between them"
+"""What a person reads before the gripper is activated."""
+BALL = "ball lies in its holder"
+"""What a person reads before the ball is pressed."""
+
 
 def begin(site, *arguments):
     return subprocess.Popen(
@@ -25,13 +30,18 @@ def until(process, words):
     pytest.fail(f"{words!r} was never printed: {process.stderr.read()}")
 
 
+def enter(process):
+    process.stdin.write("\n")
+    process.stdin.flush()
+
+
 @pytest.mark.timeout(900)
 def test_calibrate_at_two_places_verify_and_analyze_by_it(site, tmp_path):
     process = begin(site, "calibrate", "--operator", "anna", "--place", "3,0")
-    until(process, "press Enter")
-    assert process.stdin is not None
-    process.stdin.write("\n")
-    process.stdin.flush()
+    until(process, EMPTY)
+    enter(process)
+    until(process, BALL)
+    enter(process)
     until(process, "lay the ball 3 mm to the right")
     site.twin(do="fruit", kind="rubber_ball", x_mm=3.0)
     output, errors = process.communicate("\n", timeout=280)
@@ -99,6 +109,25 @@ def test_it_asks_first_and_an_input_that_has_ended_calls_it_off(site):
     assert done.returncode == 130
     assert "hands are away" in done.stdout
     assert site.twin(do="state")["width_mm"] > 52
+
+
+@pytest.mark.parametrize(("command", "prompt"), [("calibrate", BALL), ("grip", "put the fruit in its place")])
+def test_a_gripper_is_activated_with_empty_jaws_before_the_ball_or_the_fruit_is_requested(
+    site, tmp_path, command, prompt
+):
+    options = ("--recipe", "rubber_ball", "--out", tmp_path / "grip") if command == "grip" else ()
+    process = begin(site, command, *options)
+    assert process.stdout is not None
+    assert EMPTY in process.stdout.readline()
+    assert site.twin(do="state")["width_mm"] > 52
+    site.twin(do="remove")
+    enter(process)
+    assert prompt in process.stdout.readline()
+    process.communicate(timeout=200)
+    assert process.returncode == 130
+    again, _ = begin(site, "calibrate").communicate(timeout=200)
+    assert EMPTY not in again, "the gripper is active"
+    assert BALL in again
 
 
 def test_nothing_is_verified_without_a_calibration_of_this_very_unit(site):

@@ -19,7 +19,7 @@ OPEN_MM = 53.0
 def test_a_grip_with_the_arm_gives_what_analyze_reads(make_cell, analyze, tmp_path):
     cell = make_cell("--fruit", "raspberry", "--seed", 3)
     out = tmp_path / "grip"
-    done = cell.station("grip", "--recipe", "raspberry", "--out", out)
+    done = cell.station("grip", "--yes", "--recipe", "raspberry", "--out", out)
     assert done.returncode == 0, done.stderr
     rows = read_table(out / "widths.csv")
     widths = [float(row["width_mm"]) for row in rows]
@@ -44,7 +44,7 @@ def test_a_grip_with_the_arm_gives_what_analyze_reads(make_cell, analyze, tmp_pa
 
 def test_on_a_bench_no_arm_is_asked(make_cell, tmp_path):
     cell = make_cell("--bench", "--fruit", "rubber_ball")
-    done = cell.station("grip", "--bench", "--recipe", "rubber_ball", "--out", tmp_path / "grip")
+    done = cell.station("grip", "--yes", "--bench", "--recipe", "rubber_ball", "--out", tmp_path / "grip")
     assert done.returncode == 0, done.stderr
     rows = read_table(tmp_path / "grip" / "widths.csv")
     assert float(rows[0]["width_mm"]) == pytest.approx(46, abs=0.4)
@@ -58,7 +58,7 @@ def test_on_a_bench_no_arm_is_asked(make_cell, tmp_path):
 def test_an_empty_nest_is_said_and_the_gripper_opened(make_cell, tmp_path):
     cell = make_cell("--bench")
     cell.twin(do="remove")
-    done = cell.station("grip", "--bench", "--recipe", "strawberry", "--out", tmp_path / "grip")
+    done = cell.station("grip", "--yes", "--bench", "--recipe", "strawberry", "--out", tmp_path / "grip")
     assert done.returncode == 1
     touched = messages.NOTHING_TOUCHED(largest_mm=53, smallest_mm=22, recipe="strawberry")
     assert str(touched) in done.stderr
@@ -76,7 +76,7 @@ def test_an_empty_nest_is_said_and_the_gripper_opened(make_cell, tmp_path):
 )
 def test_a_camera_that_fails_in_mid_grip_ends_it_and_lets_go(make_cell, tmp_path, device, fault, words):
     cell = make_cell("--bench", "--fruit", "strawberry")
-    grip = cell.begin("grip", "--bench", "--recipe", "strawberry", "--out", tmp_path / "grip")
+    grip = cell.begin("grip", "--yes", "--bench", "--recipe", "strawberry", "--out", tmp_path / "grip")
     assert grip.stdout is not None
     assert grip.stdout.readline()
     cell.twin(do="set", device=device, fault=fault)
@@ -97,7 +97,7 @@ def test_a_camera_that_fails_in_mid_grip_ends_it_and_lets_go(make_cell, tmp_path
 )
 def test_an_arm_that_is_stopped_on_its_way_back_is_left_to_a_person(make_cell, tmp_path, device, fault, stop):
     cell = make_cell("--fruit", "blueberry")
-    grip = cell.begin("grip", "--recipe", "blueberry", "--out", tmp_path / "grip")
+    grip = cell.begin("grip", "--yes", "--recipe", "blueberry", "--out", tmp_path / "grip")
     assert grip.stdout is not None
     assert grip.stdout.readline()
     cell.twin(do="set", device=device, fault=fault)
@@ -111,7 +111,7 @@ def test_an_arm_that_is_stopped_on_its_way_back_is_left_to_a_person(make_cell, t
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_grip_that_is_called_off_lets_go(make_cell, tmp_path, ending):
     cell = make_cell("--bench", "--fruit", "strawberry")
-    grip = cell.begin("grip", "--bench", "--recipe", "strawberry", "--out", tmp_path / "grip")
+    grip = cell.begin("grip", "--yes", "--bench", "--recipe", "strawberry", "--out", tmp_path / "grip")
     assert grip.stdout is not None
     for _ in range(3):
         assert grip.stdout.readline()
@@ -126,9 +126,9 @@ def test_a_folder_is_made_with_the_first_image_and_never_mixed_into(make_cell, t
     cell = make_cell("--bench")
     out = tmp_path / "grip"
     cell.twin(do="set", device="camera", fault="off")
-    assert cell.station("grip", "--bench", "--recipe", "strawberry", "--out", out).returncode == 1
+    assert cell.station("grip", "--yes", "--bench", "--recipe", "strawberry", "--out", out).returncode == 1
     assert not out.exists()
     (out / "frames").mkdir(parents=True)
-    done = cell.station("grip", "--bench", "--recipe", "strawberry", "--out", out)
+    done = cell.station("grip", "--yes", "--bench", "--recipe", "strawberry", "--out", out)
     assert done.returncode == 2
     assert "name a new folder" in done.stderr

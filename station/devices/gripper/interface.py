@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
+from station.devices.gripper.errors import NEEDS_ACTIVATION
+
 
 class ObjectState(StrEnum):
     """Object detection between the fingers."""
@@ -40,6 +42,11 @@ class GripperReading:
     def age_s(self, now_s: float) -> float:
         """Return the age of the reading, in seconds, at a time of `time.monotonic()`."""
         return now_s - self.at_s
+
+    @property
+    def needs_activation(self) -> bool:
+        """Return whether it moves again only after an activation, in which its fingers travel their whole way."""
+        return not self.active or self.fault_code in NEEDS_ACTIVATION
 
 
 @dataclass(frozen=True, slots=True)

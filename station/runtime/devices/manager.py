@@ -262,7 +262,7 @@ class DeviceManager:
         """
         async with self._recovery:
             reading = await self.cell.gripper.read()
-            if _is_activated(reading):
+            if not reading.needs_activation:
                 self._confirmed_clear = False
                 return
             try:
@@ -358,7 +358,7 @@ class DeviceManager:
     async def _check_gripper(self) -> None:
         reading = await self.cell.gripper.read()
         self._gripper_reading = reading
-        if _is_activated(reading):
+        if not reading.needs_activation:  # from now on it may hold something
             self._confirmed_clear, self._not_activated = False, None
         if reading.fault_code in NEEDS_ACTIVATION or reading.fault_code == _OVER_TEMPERATURE:
             fault = GripperFaultError(reading.fault_code)
@@ -376,11 +376,6 @@ class DeviceManager:
         self._stale_checks = self._stale_checks + 1 if stale else 0
         if fault is not None and not 0 < self._stale_checks < _STALE_CHECKS:
             raise fault.again()
-
-
-def _is_activated(reading: GripperReading) -> bool:
-    """Check whether a gripper could move its fingers, and so may hold something between them."""
-    return reading.active and reading.fault_code not in NEEDS_ACTIVATION
 
 
 def _is_stop(fault: StationError) -> bool:

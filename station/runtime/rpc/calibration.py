@@ -39,7 +39,7 @@ from station.messages.message import Message, joined, message_of
 from station.messages.operation import internal_fault
 from station.records.audit import AuditEntry, append_audit
 from station.records.records import Records
-from station.runtime.devices.calibration_rig import CalibrationRig
+from station.runtime.devices.calibration_rig import CalibrationRig, Refusals
 from station.runtime.observability.audit_logger import AuditLogger, calibration_entry, verification_entry
 from station.runtime.production.production import Production
 from station.settings.configuration import Configuration
@@ -213,9 +213,9 @@ class PanelCalibration:
             self._devices.cell,
             recipe,
             lambda place: self._lay(run, place),
+            lambda: self._devices.activate_if_safe(lambda: self._motion_refusal() is None),
             self._site.service.patience,
-            self._motion_refusal,
-            self._opening_refusal,
+            Refusals(self._motion_refusal, self._opening_refusal),
         )
 
     async def _calibrate(self, run: _Run, request: StartCalibrationRun) -> None:

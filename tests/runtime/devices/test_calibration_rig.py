@@ -4,18 +4,21 @@ import asyncio
 import time
 from types import SimpleNamespace
 from typing import Any
-from unittest.mock import AsyncMock
 
 import pytest
 
 from station.channel.panel_maintenance import ContinueCalibrationRun, StartCalibrationRun
+from station.devices.gripper.errors import GripperNotActiveError
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
 from station.errors import StationError
 from station.inspection.states import STATES, State
+from station.messages import gripper as gripper_messages
 from station.messages.operation import INTERNAL_FAULT
 from station.press.rig import GripError
+from station.runtime.devices.manager import DeviceManager
 from station.runtime.devices.rig import Cell
 from station.runtime.rpc.calibration import PanelCalibration, _Run
+from station.settings.configuration import Configuration
 from station.settings.recipe import find_recipe
 from tests.runtime.ball import MAX
 
@@ -24,19 +27,29 @@ PRESSED_MM = 40.0
 
 
 class Devices:
-    """A gripper and an arm in one, which record the requests to them."""
+    """A gripper without its activation and an arm in one, which record the requests to them."""
 
-    max_width_mm = OPEN_MM
+    max_width_mm, known_width_mm = OPEN_MM, None
 
     def __init__(self) -> None:
         self.moves: list[str] = []
+        self.active, self.at = False, "home"
+
+    def _reading(self, width_mm: float) -> GripperReading:
+        return GripperReading(width_mm, 0, ObjectState.AT_POSITION, self.active, 0, None, time.monotonic())
 
     def _at(self, width_mm: float) -> MoveResult:
-        reading = GripperReading(width_mm, 0, ObjectState.AT_POSITION, True, 0, None, time.monotonic())
-        return MoveResult(width_mm, reading)
+        return MoveResult(width_mm, self._reading(width_mm))
+
+    async def read(self) -> GripperReading:
+        return self._reading(PRESSED_MM)
+
+    async def state(self) -> Any:
+        return SimpleNamespace(at=self.at, fault=None)
 
     async def activate(self) -> None:
         self.moves.append("activate")
+        self.active = True
 
     async def open(self, width_mm: float | None = None) -> MoveResult:
         self.moves.append("open")
@@ -72,7 +85,8 @@ class Panel:
         gripper_and_arm: Any = self.devices
         cell = Cell(camera, gripper_and_arm, gripper_and_arm)
         site: Any = SimpleNamespace(home=home, service=SimpleNamespace(patience=1.0))
-        devices = SimpleNamespace(cell=cell, restore_light=AsyncMock())
+        devices = DeviceManager(Configuration(home=home), lambda *_: None, lambda _: None)
+        devices.cell, devices._arm = cell, gripper_and_arm
         production: Any = SimpleNamespace(service=self.service, devices=devices)
         unused: Any = None
         self.calibration = PanelCalibration(site, production, unused, unused, unused, lambda: None)
@@ -118,6 +132,15 @@ def test_where_the_cycle_was_stopped_a_run_moves_nothing_but_jaws_that_may_open(
 
     asyncio.run(scenario())
     assert panel.devices.moves == moves
+
+
+def test_a_gripper_that_may_have_the_ball_between_its_jaws_is_not_activated_and_nothing_moves(panel):
+    panel.service.state, panel.devices.at = State.STOPPED, "nest"
+    with pytest.raises(GripperNotActiveError) as refused:
+        asyncio.run(panel.rig.make_ready())
+    assert refused.value.cause == gripper_messages.JAWS_UNKNOWN()
+    assert refused.value.remedy == gripper_messages.REMEDY_EMPTY_JAWS()
+    assert panel.devices.moves == []
 
 
 def test_an_arm_that_is_stopped_on_its_way_does_not_begin_the_next_part(panel, monkeypatch):
