@@ -8,9 +8,9 @@ from typing import get_args
 import click
 
 from station.channel.client import ChannelClient
-from station.channel.line import CommandDone, Open, Resume
+from station.channel.line import CommandDone
 from station.channel.messages import DeadlineError
-from station.channel.panel import Recover, RecoveryName
+from station.channel.panel import AlarmList, ListAlarms, Recover, RecoveryName
 from station.commands.site import site_or_last_good
 from station.config_option import config_option
 from station.devices.arm.faults import ArmFault
@@ -78,7 +78,8 @@ async def _recovered_by_the_station(configuration: Configuration, what: Recovery
     endpoint = line_endpoint(configuration.handshake, configuration.home)
     async with ChannelClient(endpoint, "the station") as station:
         try:
-            await station.request(Resume(), Open, deadline_s=_STATION_DEADLINE_S)
+            # Answered from memory, also while the records cannot be opened.
+            await station.request(ListAlarms(), AlarmList, deadline_s=_STATION_DEADLINE_S)
         except DeadlineError:
             return False
         deadline_s = configuration.arm.recovery_deadline_s + _STATION_DEADLINE_S

@@ -18,6 +18,7 @@ from station.records.records import Records
 from station.runtime.station import Station
 from station.settings.configuration import load_configuration
 from station.settings.records import RecordsSettings
+from tests.command_line import call
 from tests.ports import free_port
 
 LIMIT_S = 90.0
@@ -185,6 +186,21 @@ def test_records_lost_are_an_alarm_where_the_stored_alarms_cannot_be_read_at_fir
             assert is_raised_for(service, database)
 
     asyncio.run(scenario())
+
+
+def test_a_station_whose_records_cannot_be_opened_recovers_the_arm_for_the_command_line(site, tmp_path, monkeypatch):
+    async def broken(_self):
+        raise RecordsDeadlineError(messages.TOO_SLOW(limit_s=2.0), messages.CHECK_DISK())
+
+    monkeypatch.setattr(Records, "reopen", broken)
+
+    async def scenario():
+        async with started(site) as service:
+            assert service.registry.fault is not None
+            recover = ("devices", "recover", "program", "--yes", "--config", tmp_path / "station.yaml")
+            return await asyncio.to_thread(call, *recover)
+
+    assert asyncio.run(scenario()) == (0, "the arm is ready\n")
 
 
 @pytest.mark.parametrize("failing", ["reopen", "load_alarms"])
