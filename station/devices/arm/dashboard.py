@@ -10,6 +10,7 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 
 from station.devices.arm.faults import ArmCause, ArmFault
+from station.devices.unsent import discard_unsent
 from station.messages import arm as messages
 
 PORT = 29999
@@ -97,6 +98,7 @@ async def dashboard(host: str) -> AsyncIterator[DashboardConversation]:
         unknown = isinstance(error, socket.gaierror)
         detail = messages.DASHBOARD_UNKNOWN_HOST if unknown else messages.DASHBOARD_ABSENT
         raise ArmFault(ArmCause.LINK_LOST, detail(address=f"{host}:{PORT}")) from error
+    discard_unsent(writer)
     try:
         conversation = DashboardConversation(host, reader, writer)
         greeting = await conversation.read_line()

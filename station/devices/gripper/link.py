@@ -40,7 +40,8 @@ class Link(Protocol):
 
     Connects when first used and again after `close` or a failure; connecting never moves the fingers. Any failure
     closes the connection, so that a late answer can never be taken for the next one.
-    Each call is one whole exchange, raises a `GripperError`, and ends within the answer time-out.
+    Each call is one whole exchange, raises a `GripperError`, and ends within the answer time-out. One that is cancelled
+    ends with the request under way, so that a command after it is carried out after it.
     """
 
     @property

@@ -18,6 +18,7 @@ from station.devices.gripper.errors import (
     GripperUnreachableError,
 )
 from station.devices.gripper.link import Status
+from station.devices.unsent import discard_unsent
 from station.messages import gripper as messages
 from station.messages.message import Message, verbatim
 from station.settings.gripper import UrcapSettings
@@ -119,7 +120,17 @@ class UrcapLink:
         raise GripperProtocolError(wrong, messages.REMEDY_PORT())
 
     async def _ask(self, request: bytes) -> bytes:
-        reader, writer = await self._connected()
+        streams = await self._connected()
+        asking = asyncio.create_task(self._answer(*streams, request))
+        try:
+            return await asyncio.shield(asking)
+        except asyncio.CancelledError:
+            # It ends within the time-out; the halt that follows is then sent after it, on the same connection. Only a
+            # second cancellation ends it.
+            await asyncio.gather(asking, return_exceptions=True)
+            raise
+
+    async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, request: bytes) -> bytes:
         answer: bytes = b""
         try:
             async with asyncio.timeout(self._answer_timeout_s):
@@ -151,6 +162,7 @@ class UrcapLink:
             except OSError as error:
                 away = messages.UNREACHABLE_BECAUSE(place=self.place, reason=_describe(error))
                 raise GripperUnreachableError(away, messages.REMEDY_URCAP()) from error
+            discard_unsent(self._streams[1])
         return self._streams
 
 

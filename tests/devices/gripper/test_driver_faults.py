@@ -7,7 +7,7 @@ import subprocess
 import sys
 import termios
 import time
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable, Coroutine
 from types import SimpleNamespace
 from typing import Any
 
@@ -37,6 +37,7 @@ from station.settings.gripper import GripperSettings, ModbusRtuSettings, UrcapSe
 from station.twin.robotiq.load import NoLoad, Spring
 from station.twin.robotiq.registers import Command
 from station.twin.robotiq.rtu import framed
+from tests.eventually import until
 
 OnWire = Callable[..., Any]
 DIGIT_MM = 32.0
@@ -246,6 +247,95 @@ def test_an_answer_to_a_cancelled_question_is_not_taken_for_the_next(on_wire: On
     on_wire(scenario)
 
 
+Serve = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Coroutine[Any, Any, None]]
+
+
+@contextlib.asynccontextmanager
+async def urcap(serve: Serve) -> AsyncIterator[UrcapSettings]:
+    """A URCap that a test writes."""
+
+    async def session(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with contextlib.closing(writer), contextlib.suppress(ConnectionError):
+            await serve(reader, writer)
+
+    async with await asyncio.start_server(session, "127.0.0.1", 0) as server:
+        yield UrcapSettings(host="127.0.0.1", port=server.sockets[0].getsockname()[1])
+
+
+def test_a_halt_is_carried_out_after_the_command_that_was_cancelled():
+    """The URCap may carry out what it has read a little later, and what comes over another connection at once."""
+
+    async def scenario() -> None:
+        received, carried_out = asyncio.Event(), list[str]()
+
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            while line := (await reader.readline()).decode().strip():
+                if line.startswith("GET"):
+                    writer.write(f"{line[4:]} {3 if line == 'GET STA' else 0}\n".encode())
+                    continue
+                if line.endswith("GTO 1"):
+                    received.set()
+                    await asyncio.sleep(0.1)
+                carried_out.append(line[-5:])
+                writer.write(b"ack")
+
+        async with urcap(serve) as wire:
+            gripper = make_gripper(GripperSettings(answer_timeout_s=5.0, urcap=wire))
+            moving = asyncio.create_task(gripper.move_to_width(20.0, 50.0, 20.0))
+            await received.wait()
+            moving.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await moving
+            await until(lambda: len(carried_out) == 2)
+            assert carried_out == ["GTO 1", "GTO 0"]
+            await gripper.close()
+
+    asyncio.run(scenario())
+
+
+def test_an_exchange_that_is_cancelled_twice_ends_at_once_and_the_next_has_a_connection_of_its_own():
+    async def scenario() -> None:
+        requests = list[bytes]()
+
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            while request := await reader.readline():
+                requests.append(request)
+                if len(requests) > 1:
+                    writer.write(b"ack")
+
+        async with urcap(serve) as wire:
+            link = UrcapLink(wire, 600.0)
+            first = asyncio.create_task(link.halt())
+            await until(lambda: requests)
+            first.cancel()
+            await asyncio.sleep(0)
+            first.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await first
+            await link.halt()
+            await link.close()
+
+    asyncio.run(scenario())
+
+
+def test_a_request_that_was_given_up_is_not_sent_on():
+    """A reset in place of an end: with it the kernel discards what it would send where a cut network comes back."""
+
+    async def scenario() -> None:
+        ends: asyncio.Future[BaseException | bytes] = asyncio.get_running_loop().create_future()
+
+        async def mute(reader: asyncio.StreamReader, _writer: asyncio.StreamWriter) -> None:
+            await reader.readline()
+            ends.set_result((await asyncio.gather(reader.read(), return_exceptions=True))[0])
+
+        async with urcap(mute) as wire:
+            with pytest.raises(GripperSilentError):
+                await UrcapLink(wire, 0.1).halt()
+            assert isinstance(await ends, ConnectionResetError)
+
+    asyncio.run(scenario())
+
+
 def test_a_short_delay_is_borne(on_wire: OnWire):
     async def scenario(rig: Any) -> None:
         rig.faults.set("delayed", 0.02)
@@ -387,19 +477,15 @@ def test_an_answer_to_another_question_is_refused():
 def test_a_value_that_a_variable_cannot_have_is_refused(lie: str):
     async def scenario() -> None:
         async def mad(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            with contextlib.closing(writer):
-                while line := await reader.readline():
-                    name = line.decode().split()[1]
-                    writer.write(f"{lie if lie.startswith(name) else f'{name} 0'}\n".encode())
+            while line := await reader.readline():
+                name = line.decode().split()[1]
+                writer.write(f"{lie if lie.startswith(name) else f'{name} 0'}\n".encode())
 
-        server = await asyncio.start_server(mad, "127.0.0.1", 0)
-        # An answer comes to every question: no limit is to pass, also where this is held up between the two.
-        link = UrcapLink(UrcapSettings(host="127.0.0.1", port=server.sockets[0].getsockname()[1]), 5.0)
-        with pytest.raises(GripperProtocolError) as caught:
-            await link.status()
-        assert lie in str(caught.value.cause.parameters["answer"])
-        server.close()
-        await asyncio.sleep(0.01)
+        async with urcap(mad) as wire:
+            # An answer comes to every question: no limit is to pass, also where this is held up between the two.
+            with pytest.raises(GripperProtocolError) as caught:
+                await UrcapLink(wire, 5.0).status()
+            assert lie in str(caught.value.cause.parameters["answer"])
 
     asyncio.run(scenario())
 
