@@ -33,8 +33,10 @@ _POLL_S = 0.005
 """The gripper refreshes its registers at 200 Hz (manual, Modbus RTU communication)."""
 _RESET_HOLD_S = 0.5
 """Between reset and activation, as in the drivers that are known to work; also the longest life of an old fault."""
+_SILENCE_S = 1.0
+"""Silence of the line after which the gripper reports fault 9 (manual)."""
 _MUTE_GRACE_S = 0.5
-"""Fault 9 means that the line was silent for a second; the next request clears it, and only a lasting one is real."""
+"""The next request clears fault 9: only a lasting one is real."""
 _AT_POSITION_COUNTS = 2
 """Largest distance from the request that counts as at position."""
 STRIDE_MM, STRIDE_S = 3.0, 0.15
@@ -74,6 +76,7 @@ class Robotiq2F85:
         self._stops = 0
         self._held_request: int | None = None
         self._mute_since_s: float | None = None
+        self._polled_s = 0.0
         self.known_width_mm: float | None = None
         """Gap at which the fingers were last read at rest while active; None once they were sent elsewhere."""
 
@@ -198,6 +201,9 @@ class Robotiq2F85:
     async def _poll(self) -> tuple[Status, float]:
         at_s = time.monotonic()
         status = await self.link.status()
+        if status.fault != _NO_COMMUNICATION or at_s - self._polled_s >= _SILENCE_S:
+            self._mute_since_s = None  # a report of fault 9 after a silence is of that silence
+        self._polled_s = at_s
         if status.state == State.ACTIVE:
             at_rest = not status.go_to or _OBJECT_STATES[status.object_] != ObjectState.MOVING
             self.known_width_mm = width_of_count(status.position, self._calibration) if at_rest else None
@@ -263,7 +269,6 @@ class Robotiq2F85:
 
     def _active_fault(self, status: Status, now_s: float) -> int:
         if status.fault != _NO_COMMUNICATION:
-            self._mute_since_s = None
             return status.fault
         if self._mute_since_s is None:
             self._mute_since_s = now_s

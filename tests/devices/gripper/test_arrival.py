@@ -68,6 +68,22 @@ def test_fingers_that_arrived_are_not_late_because_their_answers_are_read_late()
     assert link.sent == [f"go_to {TARGET}"]
 
 
+def test_a_report_of_no_communication_after_a_pause_does_not_count_from_that_before_it(monkeypatch):
+    now_s = 100.0
+    monkeypatch.setattr(robotiq, "time", SimpleNamespace(monotonic=lambda: now_s))
+    there = replace(START, echo=TARGET, position=TARGET)
+    mute = replace(there, fault=9)
+    gripper = Robotiq2F85(ScriptedLink(mute, mute, mute, there), GripperSettings())
+
+    async def scenario() -> None:
+        nonlocal now_s
+        assert (await gripper.move_to_width(WIDTH_MM, 100.0, 20.0)).reading.fault_code == 9
+        now_s += 60.0
+        assert (await gripper.move_to_width(WIDTH_MM, 100.0, 20.0)).reading.fault_code == 0
+
+    asyncio.run(scenario())
+
+
 @pytest.mark.parametrize(("answers_in_s", "every_s"), [(0.002, 0.005), (0.008, 0.008)])
 def test_a_moving_gripper_is_asked_as_often_as_it_refreshes_however_long_an_answer_takes(
     monkeypatch, answers_in_s, every_s
