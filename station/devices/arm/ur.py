@@ -229,6 +229,8 @@ class UrArm:
             raise ArmFault(ArmCause.UNREACHABLE, messages.UNREACHABLE(pose=where))
 
     async def _go(self, target: Six, where: Message, tolerance_rad: float, *, straight: bool) -> None:
+        if self._stopped.is_set():  # `stop` may have reported already that the arm is at rest
+            raise ArmFault(ArmCause.STOPPED, messages.MOTION_STOPPED(pose=where))
         try:
             await self._begin(target, straight=straight)
             await self._arrive(target, where, tolerance_rad)

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from station.devices.arm.faults import ArmCause
-from station.devices.arm.messages import Move
+from station.devices.arm.messages import Move, Reachable
 from station.devices.arm.ur import UrArm
 from station.settings.arm import ArmPoses
 from station.twin.ur.script import RuntimeState
@@ -124,6 +124,28 @@ def test_a_stop_at_the_very_beginning_of_a_move_stops_it_too(healthy_arm, until,
             assert await cause_of(move) is ArmCause.STOPPED
             await until(lambda: not bench.controller.body.moving)
             assert bench.controller.joints_rad[0] < 0.2
+
+    asyncio.run(run())
+
+
+def test_no_motion_begins_after_a_stop_that_came_while_the_pose_was_checked(healthy_arm, until, monkeypatch):
+    async def run():
+        async with healthy_arm() as (_, arm):
+            orders, order, go_on = [], arm._link.order, asyncio.Event()
+
+            async def held(request):
+                orders.append(type(request))
+                if isinstance(request, Reachable):
+                    await go_on.wait()
+                return await order(request)
+
+            monkeypatch.setattr(arm._link, "order", held)
+            move = asyncio.create_task(arm.move_to("accept"))
+            await until(lambda: Reachable in orders)
+            await arm.stop()
+            go_on.set()
+            assert await cause_of(move) is ArmCause.STOPPED
+            assert Move not in orders
 
     asyncio.run(run())
 
