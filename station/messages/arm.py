@@ -71,6 +71,10 @@ LOCAL_CONTROL = define(
     "arm.local_control", "the controller is in local control and takes neither programs nor commands"
 )
 REGISTERS_IN_USE = define("arm.registers_in_use", "another client or a fieldbus holds the controller's input registers")
+OWN_REGISTERS_HELD = define(
+    "arm.own_registers_held",
+    "the controller still holds its input registers for the station's connection that was cut",
+)
 WATCHDOG = define("arm.watchdog", "the controller's watchdog stopped the program, because the station was not healthy")
 PROGRAM_STOPPED = define("arm.program_stopped", "the control program was stopped on the controller")
 PROGRAM_STOPPED_BECAUSE = define(

@@ -52,6 +52,9 @@ END_AGAIN_S = 1.0
 """Pause before a stop is sent again, s; an estimate."""
 PROCESS_START_LIMIT_S = 60.0
 """As the supervisor gives each of the station's processes."""
+OWN_CLAIM_S = 15.0
+"""Longest time for which a controller may hold the input registers for a commanding connection of this station that was
+cut, s; it drops a client that does not read after about 10 s (an estimate, unverified on hardware)."""
 SELF_HEALING = {ArmCause.LINK_LOST, ArmCause.STALE, ArmCause.DEADLINE}
 """Causes that a new process may clear without a person."""
 
@@ -71,6 +74,7 @@ class ArmLink:
         self._was_healthy = True
         self._tries_left = UPLOAD_TRIES
         self._end_again_s = 0.0
+        self._own_claim_until_s = 0.0
         self._lock = asyncio.Lock()
         self._maintaining: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
@@ -206,6 +210,8 @@ class ArmLink:
         snapshot = await self._state(process, BEAT_DEADLINE_S)
         if snapshot.age_s > self._settings.link_lost_after_s:
             raise ArmFault(ArmCause.LINK_LOST, messages.STATE_OLD(age_s=snapshot.age_s))
+        if snapshot.commanding:
+            self._own_claim_until_s = time.monotonic() + OWN_CLAIM_S
         return snapshot
 
     async def upload(self) -> None:
@@ -308,7 +314,8 @@ class ArmLink:
             if latched is ArmCause.PROGRAM_STOPPED and snapshot.runtime_state != PLAYING:
                 await self._end_program(snapshot)
         elif snapshot.runtime_state != PLAYING:
-            self._store_or_raise(await self._explain(None))
+            # After a stop a person starts the program, however the station's health was meanwhile.
+            self._store_or_raise(await self._explain(None, by_state=latched is not None))
             await self._end_program(snapshot)
         elif self._lost is not None:
             self._set(None)
@@ -345,6 +352,9 @@ class ArmLink:
             payload_centre_mm=settings.payload_centre_mm,
             watchdog_hz=settings.watchdog_hz,
         )
+        own_claim_until_s = self._own_claim_until_s
+        # However this ends, and also where a cut leaves it without an end, it may have claimed the registers.
+        self._own_claim_until_s = time.monotonic() + settings.constructor_limit_s + OWN_CLAIM_S
         outcome = await process.request(request, Outcome, deadline_s=settings.constructor_limit_s)
         # The lease that the process knew may have run out while the connection was made: the beats in this renew it
         # before the watchdog that has just been set up expects a kick.
@@ -356,6 +366,10 @@ class ArmLink:
             # Nobody stops a program that was never seen to play: rather the link was cut while it was started.
             self._tries_left -= 1
             raise ArmFault(ArmCause.LINK_LOST, messages.PROGRAM_NOT_BEGUN())
+        if fault.cause is ArmCause.REGISTERS_IN_USE:
+            self._own_claim_until_s = own_claim_until_s  # it claimed none
+            if time.monotonic() < own_claim_until_s:
+                raise ArmFault(ArmCause.LINK_LOST, messages.OWN_REGISTERS_HELD())
         self._store_or_raise(fault)
 
     async def _plays(self, process: ArmProcess) -> bool:
@@ -368,7 +382,7 @@ class ArmLink:
             await asyncio.sleep(POLL_S)
         return False
 
-    async def _explain(self, output: Message | None) -> ArmFault:
+    async def _explain(self, output: Message | None, *, by_state: bool = False) -> ArmFault:
         fault = from_output(output)
         if fault is not None or self._process is None:
             away = messages.NOT_CONNECTED_BECAUSE(reason=output) if output else messages.NOT_CONNECTED()
@@ -376,7 +390,8 @@ class ArmLink:
         async with dashboard(self._settings.host) as conversation:
             facts = await conversation.facts()
         snapshot = await self._state(self._process, BEAT_DEADLINE_S)
-        return diagnose(snapshot, facts, output, was_healthy=self._was_healthy and not snapshot.kicks_late)
+        was_healthy = by_state or (self._was_healthy and not snapshot.kicks_late)
+        return diagnose(snapshot, facts, output, was_healthy=was_healthy)
 
     async def explain(self, output: Message | None) -> ArmFault:
         """Return why a command was not done, with its output if it gave one; it becomes the link's fault."""

@@ -5,6 +5,7 @@ import time
 
 import pytest
 
+from station.devices.arm import dashboard, link
 from station.devices.arm.arm import ArmState
 from station.devices.arm.faults import ArmCause, ArmFault
 from station.devices.arm.messages import Beat, Outcome, Reachable, Snapshot, Start, Watch
@@ -33,6 +34,65 @@ def test_a_cut_link_in_mid_move_stops_the_arm_and_comes_back_by_itself(healthy_a
             bench.faults.clear("link_cut")
             await arm.ready(15.0)
             await arm.move_to("above_nest")
+
+    asyncio.run(run())
+
+
+def test_registers_that_the_controller_still_holds_for_the_cut_connection_are_waited_for(
+    healthy_arm, until, monkeypatch
+):
+    """As it does where the cut lets no end of the connection through, until it drops it itself."""
+    monkeypatch.setattr(link, "OWN_CLAIM_S", 120.0)  # longer than a busy machine takes to connect again
+
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            registers, held = bench.controller.registers, []
+            monkeypatch.setattr(registers, "release", held.append)
+            bench.faults.set("link_cut")
+            await until(lambda: has_cause(arm, ArmCause.LINK_LOST))
+            bench.faults.clear("link_cut")
+            await until(lambda: arm._link.fault.detail == messages.OWN_REGISTERS_HELD(), 60.0)
+            assert await has_cause(arm, ArmCause.LINK_LOST)
+            monkeypatch.undo()
+            for connection in held:
+                registers.release(connection)
+            await arm.ready(60.0)
+            await arm.move_to("accept")
+
+    asyncio.run(run())
+
+
+def test_registers_that_stay_held_after_a_cut_are_another_clients(healthy_arm, until, monkeypatch):
+    monkeypatch.setattr(link, "OWN_CLAIM_S", 3.0)
+    monkeypatch.setattr(link, "LONGEST_PAUSE_S", 0.2)  # so that a window that each attempt renewed would never end
+
+    async def run():
+        async with healthy_arm() as (bench, arm):
+            monkeypatch.setattr(bench.controller.registers, "release", lambda _: None)
+            bench.controller.network.cut()
+            await until(lambda: has_cause(arm, ArmCause.REGISTERS_IN_USE), 60.0)
+
+    asyncio.run(run())
+
+
+def test_a_request_to_the_dashboard_server_that_was_given_up_is_not_sent_on(host, monkeypatch):
+    """A reset in place of an end: with it the kernel discards what it would send where a cut network comes back."""
+    monkeypatch.setattr(dashboard, "LINE_DEADLINE_S", 0.1)
+
+    async def run():
+        ends: asyncio.Future[BaseException | bytes] = asyncio.get_running_loop().create_future()
+
+        async def mute(reader, writer):
+            writer.write(b"Connected: Universal Robots Dashboard Server\n")
+            assert await reader.readline() == b"brake release\n"
+            ends.set_result((await asyncio.gather(reader.read(), return_exceptions=True))[0])
+            writer.close()
+
+        async with await asyncio.start_server(mute, host, dashboard.PORT):
+            with pytest.raises(ArmFault):
+                async with dashboard.dashboard(host) as conversation:
+                    await conversation.request("brake release")
+            assert isinstance(await ends, ConnectionResetError)
 
     asyncio.run(run())
 

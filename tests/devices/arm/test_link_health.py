@@ -2,15 +2,18 @@
 
 import asyncio
 import contextlib
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from station.devices.arm import link
 from station.devices.arm.dashboard import DashboardFacts
-from station.devices.arm.diagnosis import PLAYING
+from station.devices.arm.diagnosis import PLAYING, RUNNING
 from station.devices.arm.faults import ArmCause, ArmFault
-from station.devices.arm.messages import Snapshot
+from station.devices.arm.messages import Outcome, Snapshot
+from station.messages import arm as messages
+from station.messages.message import verbatim
 from station.settings.arm import ArmSettings
 
 SIX = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -20,14 +23,14 @@ STOPPED = PLAYING - 1
 class Process:
     """The ur-rtde process of a powered arm in remote control."""
 
-    state, kicks_late, safety_bits, connected = PLAYING, False, 1, True
+    state, kicks_late, robot_mode, safety_bits, connected = PLAYING, False, RUNNING, 1, True
 
     async def request(self, _request, _reply, *, deadline_s):
         return Snapshot(
             age_s=0.0,
             joints_rad=SIX,
             speeds_rad_s=SIX,
-            robot_mode=7,
+            robot_mode=self.robot_mode,
             safety_bits=self.safety_bits,
             runtime_state=self.state,
             commanding=True,
@@ -35,6 +38,18 @@ class Process:
             connected=self.connected,
             kicks_late=self.kicks_late,
         )
+
+
+class Commanded:
+    """The ur-rtde process that gives no answer, or one, to the request for the commanding connection."""
+
+    answer: Any = None
+
+    async def request(self, request, _reply, *, deadline_s):
+        if self.answer is None:
+            silent = messages.PROCESS_SILENT(limit_s=deadline_s, request=request.meaning)
+            raise ArmFault(ArmCause.DEADLINE, silent)
+        return self.answer
 
 
 class Dashboard:
@@ -126,6 +141,52 @@ def test_a_connection_that_the_controller_closed_is_lost_whatever_was_received_l
         assert arm.lost is read.value
 
     asyncio.run(scenario())
+
+
+def test_registers_held_after_a_connection_that_was_cut_while_it_was_made_may_be_the_stations_own(monkeypatch):
+    now_s = 100.0
+    monkeypatch.setattr(link, "time", SimpleNamespace(monotonic=lambda: now_s))
+
+    async def scenario():
+        nonlocal now_s
+        process: Any = Commanded()
+        arm = link.ArmLink(ArmSettings())
+        with pytest.raises(ArmFault) as cut:
+            await arm._command(process)
+        process.answer = Outcome(done=False, output=verbatim("RTDE input registers are already in use!"))
+        for later_s in (1.0, 14.0):
+            now_s += later_s
+            with pytest.raises(ArmFault) as held:
+                await arm._command(process)
+            assert held.value.detail == messages.OWN_REGISTERS_HELD()
+        now_s += 60.0
+        await arm._command(process)
+        return cut.value.cause, arm.fault and arm.fault.cause
+
+    assert asyncio.run(scenario()) == (ArmCause.DEADLINE, ArmCause.REGISTERS_IN_USE)
+
+
+@pytest.mark.usefixtures("dashboard_requests")
+@pytest.mark.parametrize(
+    ("robot_mode", "safety_bits"),
+    [(RUNNING - 4, 1), (RUNNING, 1 << 2), (RUNNING - 4, 1 << 6)],
+    ids=["no power", "protective stop", "emergency stop"],
+)
+def test_a_lapse_during_a_stop_does_not_make_it_the_watchdogs(robot_mode, safety_bits):
+    """The station restarts by itself what the watchdog stopped; after a stop a person may be at the arm."""
+
+    async def scenario():
+        arm, process = linked()
+        process.state, process.robot_mode, process.safety_bits = STOPPED, robot_mode, safety_bits
+        for lease_s in (60.0, -0.05):
+            arm.renew_health(lease_s)
+            await arm._watch(process)
+        arm.renew_health(60.0)
+        process.robot_mode, process.safety_bits, process.kicks_late = RUNNING, 1, True
+        await arm._watch(process)
+        return arm.fault and arm.fault.cause
+
+    assert asyncio.run(scenario()) is ArmCause.PROGRAM_STOPPED
 
 
 PAUSED, RESUMING = 4, 5

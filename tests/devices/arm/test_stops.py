@@ -227,10 +227,21 @@ def test_what_forbids_the_connection_is_named(bench, fault, cause):
     asyncio.run(run())
 
 
-def test_registers_that_another_client_claimed_are_named(healthy_arm):
+def test_registers_that_another_client_claimed_are_named_also_after_a_while_of_watching(
+    healthy_arm, until, monkeypatch
+):
     async def run():
         async with healthy_arm() as (bench, _), UrArm(bench.settings()) as second:
             assert await cause_of(second.ready(20.0)) is ArmCause.REGISTERS_IN_USE
+            watch, watched = second._link._watch, []
+
+            async def noted(process):
+                await watch(process)
+                watched.append(process)
+
+            monkeypatch.setattr(second._link, "_watch", noted)
+            await until(lambda: watched)
+            assert await cause_of(second.upload_again()) is ArmCause.REGISTERS_IN_USE
 
     asyncio.run(run())
 
