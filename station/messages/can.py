@@ -173,7 +173,7 @@ ORDER_LATE = define(
     "count {at_count} was past when the gate got the order, at {now_count}; the fruit went by: raise "
     "can.distance_counts or shorten the inspection",
 )
-GATE_FULL = define("can.gate_full", "the gate has no place left for an order; slow the line down")
+GATE_FULL = define("can.gate_full", "all places of the gate are taken; if this occurs often, slow the line down")
 LANE_REFUSED = define(
     "can.lane_refused",
     "the gate does not accept lane {lane} (answer {answer}); check the lane",

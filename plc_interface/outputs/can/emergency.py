@@ -32,7 +32,7 @@ _CLASSES = {
 
 
 def is_reset(code: int) -> bool:
-    """Return whether a code reports that no error is left (CiA 301: 00xx)."""
+    """Return whether a code reports that an error has gone, and all of them where the register is 0 (CiA 301: 00xx)."""
     return code & 0xFF00 == 0
 
 

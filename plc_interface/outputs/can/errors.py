@@ -45,6 +45,10 @@ class RejectRefusedError(RejectError):
     """The order cannot be carried out; the gate did not actuate."""
 
 
+class GateFullError(RejectRefusedError):
+    """All places of the gate are taken; the order may be repeated."""
+
+
 class EchoMissingError(RejectError):
     """The gate did not confirm or report in time; whether it actuated is unknown."""
 

@@ -58,6 +58,7 @@ class LineIo:
         self._healthy_until_s = 0.0
         self._link: CanLink | None = None
         self._operational = False
+        self._pause_s = settings.retry_s
         self._trouble: Message | None = None
         self._tasks: list[asyncio.Task[None]] = []
         self._worker: ThreadPoolExecutor | None = None
@@ -228,25 +229,23 @@ class LineIo:
         link.send(HEARTBEAT + self._settings.station_node, bytes([_OPERATIONAL]))
 
     async def _keep_up(self) -> None:
-        pause_s = self._settings.retry_s
         while True:
             try:
                 while not self._healthy:
                     await asyncio.sleep(bring_up.POLL_S)
                 await self._session()
             except _HealthEndedError:
-                self._trouble, pause_s = None, self._settings.retry_s
+                self._trouble, self._pause_s = None, self._settings.retry_s
                 continue
             except NodeLostError as error:
                 self._failed("nodes_lost", error.message)
-                pause_s = self._settings.retry_s
             except LineIoError as error:
                 self._failed("bring_up_failures", error.message)
             except Exception:
                 log.exception("the CAN driver failed")
                 self._failed("bring_up_failures", messages.DRIVER_FAILED())
-            await asyncio.sleep(pause_s)
-            pause_s = min(2 * pause_s, _LONGEST_PAUSE_S)
+            await asyncio.sleep(self._pause_s)
+            self._pause_s = min(2 * self._pause_s, _LONGEST_PAUSE_S)
 
     def _failed(self, counter: str, why: Message) -> None:
         self._counters[counter] += 1
@@ -271,7 +270,7 @@ class LineIo:
         self._emergencies.clear()
         try:
             await self._bring_up(link)
-            self._operational, self._trouble = True, None
+            self._operational, self._trouble, self._pause_s = True, None, self._settings.retry_s
             self._counters["bring_ups"] += 1
             await self._watch(link)
         except LineIoError as error:
@@ -302,6 +301,8 @@ class LineIo:
             # before the order, so that it is never operational for a station that has gone.
             self._send_beat(link)
             await self._order(link, node, "OPERATIONAL", _OPERATIONAL)
+        # A count of before is not the gate's, which would refuse an order as late: not ready until both have the next.
+        link.count = None
 
     async def _order(self, link: CanLink, node: bring_up.Node, name: str, state: int) -> None:
         """Command a state and wait until the node's heartbeat reports it."""
@@ -347,7 +348,8 @@ class LineIo:
     def _on_emergency(self, emergency: Emergency) -> None:
         node, code, register = emergency
         if is_reset(code):
-            self._emergencies = {key: text for key, text in self._emergencies.items() if key[0] != node}
+            if not register:  # else one error has gone and others remain (CiA 301, 7.2.7)
+                self._emergencies = {key: text for key, text in self._emergencies.items() if key[0] != node}
             return
         self._counters["emergencies"] += 1
         self._emergencies[node, code] = described_emergency(self._name(node), code, register)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from plc_interface.outputs.can.counts import ahead
 from plc_interface.outputs.can.errors import (
     EchoWrongError,
+    GateFullError,
     LateRejectError,
     RejectError,
     RejectLostError,
@@ -91,7 +92,7 @@ class PendingReject:
             case Fired.LATE:
                 raise LateRejectError(sequence, messages.ORDER_LATE(at_count=at, now_count=report.encoder_count))
             case Fired.FULL:
-                raise RejectRefusedError(sequence, messages.GATE_FULL())
+                raise GateFullError(sequence, messages.GATE_FULL())
             case _:
                 raise RejectRefusedError(sequence, messages.LANE_REFUSED(lane=self.order.lane, answer=report.fired))
 
@@ -109,7 +110,7 @@ class PendingRejects:
 
     @contextmanager
     def under_way(self, order: Order) -> Iterator[PendingReject]:
-        """Expect reports of this order; a failure is counted and stored as a fault.
+        """Expect reports of this order; a failure is counted and stored as a fault, but not that the gate is full.
 
         Raises:
             RejectRefusedError: an order with this sequence is pending.
@@ -119,6 +120,8 @@ class PendingRejects:
         pending = self._pending[order.on_wire] = PendingReject(order, self._tolerance_counts)
         try:
             yield pending
+        except GateFullError:
+            raise  # no fault: there is time to repeat the order until its count is past
         except RejectError as error:
             self.blame(error)
             raise

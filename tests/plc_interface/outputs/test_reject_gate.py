@@ -56,6 +56,11 @@ def armed(rig, *sequences):
     return rig.until(lambda: set(rig.nodes.gate._armed) == set(sequences))
 
 
+def move_to(rig, count):
+    """Move the belt, which stands."""
+    rig.nodes.encoder._way = float(count)
+
+
 def test_what_is_not_pass_is_shot_into_the_rejects_and_pass_is_not(gated):
     async def scenario(rig):
         count = rig.gate.encoder_count()
@@ -172,7 +177,73 @@ def test_a_shot_outlives_the_interface(gated):
     gated(scenario)
 
 
-@pytest.mark.parametrize(("off", "why"), [(-1501, messages.COUNT_PAST), (1, messages.COUNT_TOO_FAR)])
+def test_a_run_of_rejects_longer_than_the_gates_places_is_diverted_as_places_become_free(gated):
+    """30 s from the nest to the flap hold more fruit than the gate has places; the next fruit has to get the free one."""
+
+    async def scenario(rig):
+        last = 30
+        at_gate = {sequence: rig.gate.encoder_count() + 300 * sequence for sequence in range(1, last + 1)}
+        for sequence in (*range(1, 9), *range(last, 8, -1)):  # the place is not the first waiting one's
+            rig.gate.publish(outcome(sequence, "FAIL", at_gate[sequence] - rig.settings.distance_counts))
+        for sequence, count in at_gate.items():
+            await armed(rig, *range(sequence, min(sequence + 8, last + 1)))
+            move_to(rig, count)
+            await rig.until(lambda sequence=sequence: fired(rig)[-1:] == [(sequence, 1)])
+        await rig.until(lambda: not rig.gate._due)
+        assert rig.gate.faults == ()
+        assert rig.gate.counters["can_shots_ordered"] == rig.gate.counters["can_shots_fired"] == last
+
+    gated(scenario, distance_counts=10_000)
+
+
+def test_an_order_that_a_full_gate_refuses_is_repeated_until_a_place_is_free(gated, monkeypatch):
+    monkeypatch.setattr("station.twin.can.gate._PLACES", 2)
+
+    async def scenario(rig):
+        count = rig.gate.encoder_count()
+        for sequence in (1, 2, 3):
+            rig.gate.publish(outcome(sequence, "FAIL", count + 300 * sequence - 1500))
+        await rig.until(lambda: rig.gate.counters.get("can_shots_ordered", 0) > 3)
+        assert set(rig.nodes.gate._armed) == {1, 2}
+        move_to(rig, count + 300)
+        await armed(rig, 2, 3)
+        rig.run_belt()
+        await rig.until(lambda: not rig.gate._due)
+        assert rig.gate.faults == ()
+        assert fired(rig) == [(1, 1), (2, 1), (3, 1)]
+
+    gated(scenario)
+
+
+def test_a_fruit_that_passes_a_full_gate_is_a_fault(gated, monkeypatch):
+    monkeypatch.setattr("station.twin.can.gate._PLACES", 0)
+
+    async def scenario(rig):
+        rig.gate.publish(outcome(1, "FAIL", rig.gate.encoder_count()))
+        await rig.until(lambda: rig.gate.counters.get("can_shots_ordered", 0) > 1)
+        assert rig.gate.faults == ()
+        rig.run_belt()
+        await rig.until(lambda: not rig.gate._due)
+        (fault,) = rig.gate.faults
+        assert messages.COUNT_PAST.id in fault.what.ids()
+        assert fired(rig) == []
+
+    gated(scenario)
+
+
+def test_an_encoder_that_counts_back_a_little_on_a_stopped_belt_costs_no_reject(gated):
+    async def scenario(rig):
+        rig.gate.publish(outcome(1, "FAIL", rig.gate.encoder_count() + 100))
+        await armed(rig, 1)
+        rig.run_belt()
+        await rig.until(lambda: not rig.gate._due)
+        assert rig.gate.faults == ()
+        assert fired(rig) == [(1, 1)]
+
+    gated(scenario, tolerance_counts=1000)
+
+
+@pytest.mark.parametrize(("off", "why"), [(-1501, messages.COUNT_PAST), (101, messages.COUNT_TOO_FAR)])
 def test_a_count_that_cannot_be_the_fruits_fires_nothing_and_is_a_fault(gated, off, why):
     async def scenario(rig):
         rig.gate.publish(outcome(9, "FAIL", rig.gate.encoder_count() + off))
@@ -185,7 +256,7 @@ def test_a_count_that_cannot_be_the_fruits_fires_nothing_and_is_a_fault(gated, o
         assert fired(rig) == []
         assert rig.gate.counters["can_shots_failed"] == 1
 
-    gated(scenario)
+    gated(scenario, tolerance_counts=100)
 
 
 def test_shots_on_the_disk_that_cannot_be_read_stop_nothing(tmp_path):

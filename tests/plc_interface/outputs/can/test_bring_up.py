@@ -72,6 +72,20 @@ def test_an_operational_gate_watches_the_station_also_where_it_goes_before_its_n
     on_bus(scenario)
 
 
+def test_the_first_order_finds_a_gate_that_has_the_encoders_count(on_bus):
+    """The encoder is operational before the gate: its first count is the station's alone."""
+
+    async def scenario(rig):
+        rig.faults.set("stuck")
+        await rig.ready()
+        shot = await rig.order(1, 400)
+        rig.run_belt()
+        assert (await shot).sequence == 1
+        assert rig.io.reject_faults == ()
+
+    on_bus(scenario, encoder_period_s=0.4)
+
+
 def test_no_session_parses_a_data_sheet_on_the_loop(on_bus, monkeypatch):
     """On that loop the registers are served too."""
 

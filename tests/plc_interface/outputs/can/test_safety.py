@@ -150,6 +150,36 @@ def test_an_emergency_is_named_and_goes_with_its_reset(on_bus):
     on_bus(scenario)
 
 
+def test_an_error_reset_clears_only_where_the_error_register_is_0(on_bus):
+    """CiA 301, 7.2.7: with code 0 and a register that is not 0, one error has gone and others remain."""
+
+    async def scenario(rig):
+        await rig.ready()
+        wire = rig.wire()
+
+        def send(node, code, register):
+            data = struct.pack("<HB5x", code, register)
+            wire.send(can.Message(arbitration_id=0x80 + node, data=data, is_extended_id=False))
+
+        def codes():
+            return [fault.parameters["code"] for fault in rig.io.bus_faults]
+
+        try:
+            send(16, 0x2310, 3)
+            send(16, 0x0000, 3)
+            send(17, 0x8250, 17)
+            await rig.until(lambda: "0x8250" in codes())
+            assert codes() == ["0x2310", "0x8250"]
+            send(16, 0x0000, 0)
+            await rig.until(lambda: codes() == ["0x8250"])
+            send(17, 0x0000, 0)
+            await rig.until(lambda: rig.io.ready)
+        finally:
+            wire.shutdown()
+
+    on_bus(scenario)
+
+
 def test_an_error_from_before_the_start_is_asked_for(on_bus):
     async def scenario(rig):
         rig.faults.set("overload")
@@ -157,7 +187,7 @@ def test_an_error_from_before_the_start_is_asked_for(on_bus):
         await rig.io.start()
         rig.io.renew_health(40)
         await rig.until(lambda: rig.io.counters.get("bring_ups"))
-        assert messages.CURRENT_HIGH.id in rig.io.why_not_ready.ids()
+        await rig.until(lambda: messages.CURRENT_HIGH.id in rig.io.why_not_ready.ids())
         rig.faults.clear()
         await rig.until(lambda: rig.io.ready)
 
@@ -173,6 +203,27 @@ def test_bus_off_is_counted_and_the_bus_is_brought_up_again(on_bus):
         await rig.until(lambda: rig.io.ready)
 
     on_bus(scenario)
+
+
+def test_the_pause_before_a_bring_up_begins_anew_after_each_that_succeeded(on_bus, monkeypatch):
+    pauses, sleep = [], asyncio.sleep
+
+    async def recorded(delay_s):
+        if delay_s > 0.1:  # longer than every period of the driver and the nodes
+            pauses.append(delay_s)
+        await sleep(delay_s)
+
+    async def scenario(rig):
+        await rig.ready()
+        for times in (1, 2, 3):
+            rig.faults.set("bus_off")
+            await rig.until(lambda times=times: rig.io.counters["bring_ups"] == 1 + times)
+            await rig.until(lambda: rig.io.ready)
+            rig.faults.clear("bus_off")
+        assert pauses == [0.11, 0.11, 0.11]
+
+    monkeypatch.setattr("asyncio.sleep", recorded)
+    on_bus(scenario, retry_s=0.11)
 
 
 def test_a_bus_that_stays_off_is_said(on_bus):
