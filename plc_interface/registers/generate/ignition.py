@@ -1,7 +1,9 @@
 """Ignition's tags as JSON: one folder for each block.
 
 Ignition's documentation, "Modbus Addressing": one-based addresses; HR signed and HRUS unsigned 16-bit, HRI and HRUI
-32-bit, HRUI_64 unsigned 64-bit, HRF float, HRS text with its length in characters. Tags only read: the PLC writes.
+32-bit, HRUI_64 unsigned 64-bit, HRF float, HRS text with its length in characters. Tags only read: the PLC writes. The
+driver's option "Span Gaps", on by default, joins tags with the addresses between them in one read, which the station
+refuses as a whole where the map has gaps.
 """
 
 import json
@@ -24,7 +26,8 @@ def ignition() -> str:
     root = {
         "name": DEVICE,
         "tagType": "Folder",
-        "documentation": f"{MADE_BY} {UNTESTED} The device has one-based addressing and not the reverse word order.",
+        "documentation": f"{MADE_BY} {UNTESTED} The device has one-based addressing, not the reverse word order, "
+        "and Span Gaps off: the station refuses a read across the map's gaps.",
         "tags": folders,
     }
     return json.dumps(root, indent=1, ensure_ascii=False) + "\n"

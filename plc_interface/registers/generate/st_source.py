@@ -25,6 +25,8 @@ class Source(NamedTuple):
     variables: tuple[Variable, ...]
     body: str
     """Its statements."""
+    comment: str
+    """What it is for, from its head."""
 
 
 def parts(text: str) -> Source:
@@ -36,4 +38,5 @@ def parts(text: str) -> Source:
         for row in _ROW.finditer(section[2])
     )
     body = text[sections[-1].end() :].removesuffix("END_FUNCTION_BLOCK\n").strip("\n")
-    return Source(variables, body)
+    head = text[: sections[0].start()].rpartition("(*")[2].partition("*)")[0]
+    return Source(variables, body, " ".join(head.split()))

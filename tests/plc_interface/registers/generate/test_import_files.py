@@ -14,6 +14,8 @@ from plc_interface.registers.generate.add_on_instruction import add_on_instructi
 from plc_interface.registers.generate.ignition import ignition
 from plc_interface.registers.generate.reference import markdown, table
 from plc_interface.registers.generate.scl import s7_1500
+from plc_interface.registers.generate.st_source import Variable, parts
+from plc_interface.registers.generate.structured_text import ARRAYS, STRUCTURES, function_block, members
 from plc_interface.registers.generate.structures import PLCOPEN, codesys, studio_5000
 from plc_interface.registers.generate.telegraf import telegraf
 from plc_interface.registers.generate.tia import tia
@@ -72,6 +74,7 @@ def test_ignition_reads_every_register():
     root = json.loads(ignition())
     tags = {tag["name"]: tag for folder in root["tags"] for tag in folder["tags"]}
     assert set(tags) == set(BY_NAME)
+    assert "one-based addressing, not the reverse word order, and Span Gaps off" in root["documentation"]
     assert all(tag["readOnly"] for tag in tags.values())
     widths = {"HR": 1, "HRUS": 1, "HRI": 2, "HRUI": 2, "HRF": 2, "HRUI_64": 4}
     for name, tag in tags.items():
@@ -141,17 +144,24 @@ def l5x_members(name: str) -> list[tuple[str, str, int]]:
     return [(m.attrib["Name"], m.attrib["DataType"], int(m.attrib["Dimension"]) or 1) for m in data_type.iter("Member")]
 
 
+def plcopen_type(element: ET.Element) -> tuple[str, int]:
+    """Name and number of elements."""
+    (kind,) = element
+    count = 1
+    if kind.tag.endswith("array"):
+        count = int(inside(kind, "p:dimension").attrib["upper"]) + 1
+        (kind,) = inside(kind, "p:baseType")
+    return kind.get("name") or kind.tag.rpartition("}")[2], count
+
+
+def plcopen_structure(name: str) -> list[tuple[str, str, int]]:
+    data_type = inside(ET.fromstring(codesys().encode()), f".//p:dataType[@name='{name}']")
+    structure = inside(data_type, "p:baseType/p:struct")
+    return [(variable.attrib["name"], *plcopen_type(inside(variable, "p:type"))) for variable in structure]
+
+
 def plcopen_members(name: str) -> list[tuple[str, str, int]]:
-    data_type = inside(ET.fromstring(codesys().encode()), f".//p:dataType[@name='FruitStation_{name}']")
-    members = []
-    for variable in inside(data_type, "p:baseType/p:struct"):
-        (kind,) = inside(variable, "p:type")
-        count = 1
-        if kind.tag.endswith("array"):
-            count = int(inside(kind, "p:dimension").attrib["upper"]) + 1
-            (kind,) = inside(kind, "p:baseType")
-        members.append((variable.attrib["name"], kind.tag.rpartition("}")[2], count))
-    return members
+    return plcopen_structure(f"FruitStation_{name}")
 
 
 @pytest.mark.parametrize("members_of", [l5x_members, plcopen_members])
@@ -166,6 +176,42 @@ def test_structures_lie_as_the_registers_do(members_of, group):
         assert (kind == "REAL") == (register.kind is Kind.F32)
         if register.kind in SIGNED:
             assert kind in {"INT", "DINT"}
+
+
+def plcopen_variable(section: str, element: ET.Element) -> Variable:
+    kind, count = plcopen_type(inside(element, "p:type"))
+    assert count == 1, "the block's arrays have named types"
+    initial = element.find("p:initialValue/p:simpleValue", {"p": PLCOPEN})
+    comment = "".join(text for part in element.findall("p:documentation", {"p": PLCOPEN}) for text in part.itertext())
+    return Variable(
+        section, element.attrib["name"], kind, "" if initial is None else initial.attrib["value"], comment.strip()
+    )
+
+
+def test_the_plcopen_block_is_the_structured_texts():
+    root, source = ET.fromstring(codesys().encode()), parts(function_block())
+    pou = inside(root, ".//p:pous/p:pou[@pouType='functionBlock']")
+    assert pou.attrib["name"] == "FB_FruitStation"
+    sections = {"inputVars": "VAR_INPUT", "outputVars": "VAR_OUTPUT", "localVars": "VAR"}
+    variables = [
+        plcopen_variable(sections[part.tag.rpartition("}")[2]] + " CONSTANT" * ("constant" in part.attrib), variable)
+        for part in inside(pou, "p:interface")
+        for variable in part
+    ]
+    assert variables == list(source.variables)
+    (text,) = inside(pou, "p:body/p:ST")
+    assert text.text == source.body
+    assert "A fruit may go on only where done AND passed." in "".join(inside(pou, "p:documentation").itertext())
+
+
+def test_the_plcopen_blocks_types_are_the_structured_texts():
+    root = ET.fromstring(codesys().encode())
+    for name, registers in STRUCTURES.items():
+        assert plcopen_structure(name) == [(member, kind, 1) for member, kind, _ in members(registers)]
+    for name, words in ARRAYS.items():
+        assert plcopen_type(inside(root, f".//p:dataType[@name='{name}']/p:baseType")) == ("WORD", words)
+    derived = {found.attrib["name"] for found in root.iter(f"{{{PLCOPEN}}}derived")}
+    assert derived == {*STRUCTURES, *ARRAYS, "TON"}
 
 
 @pytest.mark.parametrize(
