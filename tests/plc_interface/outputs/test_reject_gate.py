@@ -178,7 +178,7 @@ def test_a_shot_outlives_the_interface(gated):
 
 
 def test_a_run_of_rejects_longer_than_the_gates_places_is_diverted_as_places_become_free(gated):
-    """30 s from the nest to the flap hold more fruit than the gate has places; the next fruit has to get the free one."""
+    """30 s of fruit before the flap are more than the places; the next fruit has to get the free one."""
 
     async def scenario(rig):
         last = 30

@@ -86,7 +86,7 @@ def test_a_reject_outlives_a_kill_at_each_write(monkeypatch, tmp_path, station, 
                 await gate.start()
                 await until(lambda: SEQUENCE in station.published)
                 assert gate._due == {SEQUENCE: ENCODER + CAN.distance_counts}
-                orders = [order.get_name() for order in gate._rejects]
+                orders = [order.get_name() for order in gate._rejects.values()]
                 assert orders == [f"reject {SEQUENCE}"], "one order, however it came"
         finally:
             await station.die()
