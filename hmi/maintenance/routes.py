@@ -42,6 +42,7 @@ from station.channel.panel_maintenance import (
     LedsSet,
     LiveImage,
     Log,
+    NoteGelChange,
     ReadLog,
     Registers,
     SetLeds,
@@ -214,9 +215,15 @@ async def frame(place: Annotated[str, StringConstraints(pattern=r"^\d{1,20}$")])
 
 
 @router.get("/sensor")
-async def sensor(request: Request, hmi: HmiNow) -> Response:
+async def sensor(
+    request: Request,
+    hmi: HmiNow,
+    locale: LocaleNow,
+    gel_changed: Annotated[Literal["yes"] | None, Query()] = None,
+) -> Response:
     """Show calibration and verification, guided."""
-    return show(request, "maintenance_sensor.html.j2", tab="sensor", **await _calibration(hmi))
+    done = locale.text("maintenance.gel_noted") if gel_changed else ""
+    return show(request, "maintenance_sensor.html.j2", tab="sensor", done=done, **await _calibration(hmi))
 
 
 @router.get("/sensor/part")
@@ -274,6 +281,13 @@ async def end(hmi: HmiNow, caller: Maintainer) -> Response:
     """Cancel the run."""
     await hmi.gateway.request(EndCalibrationRun(actor=actor_of(caller)), CalibrationRunView, deadline_s=MOVE_DEADLINE_S)
     return go_to("/maintenance/sensor")
+
+
+@router.post("/sensor/gel-changed")
+async def note_gel_change(hmi: HmiNow, caller: Maintainer) -> Response:
+    """Note that the gel was changed: no calibration is in force until the next one."""
+    await hmi.gateway.request(NoteGelChange(actor=actor_of(caller)), CalibrationState, deadline_s=SLOW_DEADLINE_S)
+    return go_to("/maintenance/sensor?gel_changed=yes")
 
 
 @router.get("/registers")

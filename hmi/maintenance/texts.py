@@ -93,6 +93,14 @@ define("maintenance.run_is_waiting", "waiting for you")
 define("maintenance.run_is_passed", "passed")
 define("maintenance.run_is_failed", "not passed")
 define("maintenance.run_is_ended", "aborted")
+define("maintenance.gel", "New gel")
+define(
+    "maintenance.gel_text",
+    "After a change of the gel the calibration is that of the old one. Note the change here, in manual mode, then"
+    " calibrate.",
+)
+define("maintenance.gel_changed", "The gel was changed")
+define("maintenance.gel_noted", "The change of the gel is noted. Calibrate the new gel with the ball.")
 define("maintenance.last_calibration", "Calibration in force")
 define("maintenance.last_verification", "Last verification")
 define("maintenance.made", "Date")

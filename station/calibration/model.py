@@ -3,7 +3,7 @@
 from datetime import UTC, datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field
 
 from station.messages import calibration as messages
 from station.messages.message import Message, verbatim
@@ -156,6 +156,18 @@ class Verification(Run):
     def drift(self) -> float | None:
         """Return the relative change of the ball's area since the calibration."""
         return None if self.area_ratio is None else self.area_ratio - 1.0
+
+
+class GelChange(Stored):
+    """Change of a unit's gel: the calibrations before it are those of another gel."""
+
+    operator: str
+    changed_at: AwareDatetime
+    """UTC, for a reader alone: which calibrations it takes out of force does not depend on a clock."""
+
+    def words(self) -> Message:
+        """Describe it, with the remedy, until the present gel is calibrated."""
+        return messages.GEL_CHANGED(at=f"{self.changed_at:%Y-%m-%d %H:%M} UTC", operator=self.operator)
 
 
 class Refusal(Run):

@@ -1,13 +1,15 @@
 """Calibration store: each calibration and verification is a folder, written atomically and never changed.
 
 `calibrations/SERIAL/ID/`, `verifications/SERIAL/ID/` and, to show a person the reasons,
-`refused_calibrations/SERIAL/ID/` in the home folder, with the record, its pictures and a page.
+`refused_calibrations/SERIAL/ID/` in the home folder, with the record, its pictures and a page. A change of the gel puts
+a mark `ID.gel_changed` beside each of the unit's calibrations, which takes it out of force for good.
 """
 
 import contextlib
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TypeVar
@@ -16,9 +18,9 @@ import cv2
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from station.atomic_file import sync_folder
+from station.atomic_file import sync_folder, write_atomically
 from station.calibration.errors import CalibrationError, UnknownCalibrationError
-from station.calibration.model import Calibration, Refusal, Serial, Stamp, Stored, Verification
+from station.calibration.model import Calibration, GelChange, Refusal, Serial, Stamp, Stored, Verification
 from station.messages import calibration as messages
 from station.vision.contact import Image
 
@@ -26,6 +28,8 @@ CALIBRATIONS, VERIFICATIONS, REFUSALS = "calibrations", "verifications", "refuse
 RECORDS = {CALIBRATIONS: "calibration.json", VERIFICATIONS: "verification.json", REFUSALS: "refusal.json"}
 REFERENCE = "reference.png"
 PAGE = "report.html"
+GEL_CHANGED = ".gel_changed"
+"""Suffix of the mark beside the folder of a calibration of an earlier gel. Its presence alone counts."""
 _UNFINISHED = ".unfinished-"
 _NAME = TypeAdapter(Stamp)
 _SERIAL = TypeAdapter(Serial)
@@ -71,12 +75,44 @@ class CalibrationStore:
         return tuple(sorted(path.name for path in _folders(self._home / CALIBRATIONS)))
 
     def calibrations(self, serial: str) -> tuple[Calibration, ...]:
-        """Return a unit's readable calibrations, the newest first."""
+        """Return a unit's readable calibrations, also those of an earlier gel, the newest first."""
         return tuple(self._all(CALIBRATIONS, serial, Calibration))
 
     def current(self, serial: str) -> Calibration | None:
-        """Return the unit's newest readable calibration; None if there is none."""
-        return next(self._all(CALIBRATIONS, serial, Calibration), None)
+        """Return the newest readable calibration of the unit's present gel; None if there is none."""
+        return next(self._all(CALIBRATIONS, serial, Calibration, of_present_gel=True), None)
+
+    def mark_gel_changed(self, serial: str, change: GelChange) -> None:
+        """Take all of a unit's calibrations out of force: they are those of an earlier gel.
+
+        Each is marked, not the newest alone, so that none returns where a person moves a newer one away.
+
+        Raises:
+            CalibrationError: it could not be stored; the calibration in force may still be.
+        """
+        folder, data = self._home / CALIBRATIONS / _SERIAL.validate_python(serial), change.model_dump_json().encode()
+        try:
+            # The newest last: an older one never takes its place meanwhile.
+            for path in sorted(made := _folders(folder)):
+                write_atomically(_gel_mark(path), data)
+            if made:
+                # Files made within one tick of the kernel's clock leave the folder the same time, and who watches it
+                # may have read it between two of them: a time of another clock is seen as a change for certain.
+                now_ns = time.time_ns()
+                os.utime(folder, ns=(now_ns, now_ns))
+        except OSError as error:
+            raise _not_stored(folder, error) from error
+
+    def gel_change(self, serial: str) -> GelChange | None:
+        """Return the last change of a unit's gel; None if none is known."""
+        with contextlib.suppress(OSError, ValueError):
+            folder = self._home / CALIBRATIONS / _SERIAL.validate_python(serial)
+            return GelChange.model_validate_json(max(folder.glob(f"*{GEL_CHANGED}")).read_bytes())
+        return None
+
+    def is_of_earlier_gel(self, calibration: Calibration) -> bool:
+        """Return whether the gel was changed since the calibration."""
+        return _gel_mark(self.folder(calibration)).exists()
 
     def verifications(self, serial: str) -> tuple[Verification, ...]:
         """Return a unit's readable verifications, the newest first."""
@@ -141,11 +177,13 @@ class CalibrationStore:
             raise _not_stored(folder / name, error) from error
         return Prepared(unfinished, folder / name)
 
-    def _all(self, kind: str, serial: str, model: type[RecordT]) -> Iterator[RecordT]:
+    def _all(self, kind: str, serial: str, model: type[RecordT], *, of_present_gel: bool = False) -> Iterator[RecordT]:
         with contextlib.suppress(ValidationError):
             folder = self._home / kind / _SERIAL.validate_python(serial)
             # The names are times, so their order is that of time.
             for path in sorted(_folders(folder), reverse=True):
+                if of_present_gel and _gel_mark(path).exists():
+                    continue
                 with contextlib.suppress(OSError, ValidationError):
                     _NAME.validate_python(path.name)
                     yield model.model_validate_json((path / RECORDS[kind]).read_bytes())
@@ -190,6 +228,10 @@ def _not_stored(folder: Path, error: OSError) -> CalibrationError:
 def press_name(number: int) -> str:
     """Return the file name of a step's picture, counted from 0."""
     return f"press_{number:02d}.png"
+
+
+def _gel_mark(folder: Path) -> Path:
+    return folder.with_name(f"{folder.name}{GEL_CHANGED}")
 
 
 def _picture(path: Path) -> Image:

@@ -196,6 +196,8 @@ class CalibrationState(ChannelMessage):
     run: CalibrationRunView | None
     run_refused: Message | None
     """Why no run can start now."""
+    gel_change_refused: Message | None
+    """Why a change of the gel cannot be noted now."""
 
 
 class StartCalibrationRun(ChannelMessage):
@@ -215,6 +217,15 @@ class ContinueCalibrationRun(ChannelMessage):
 
 class EndCalibrationRun(ChannelMessage):
     """Cancel the run; the jaws open. Idempotent; answered with `CalibrationRunView`."""
+
+    actor: Actor
+
+
+class NoteGelChange(ChannelMessage):
+    """Note, in manual mode, that the sensor's gel was changed: no calibration is in force until the next one.
+
+    Answered with `CalibrationState`.
+    """
 
     actor: Actor
 

@@ -105,8 +105,8 @@ def analyze_command(
 
 def _calibration(home: Path, serial: str) -> Calibration:
     store = CalibrationStore(home)
-    calibration = store.current(serial)
-    if calibration is None:
+    calibrations = store.calibrations(serial)  # also of an earlier gel: the images may be of it
+    if not calibrations:
         known = ", ".join(store.serials()) or "none yet"
         raise UnknownCalibrationError(f"--unit {serial}: it has no calibration in {home}; calibrated are: {known}")
-    return calibration
+    return calibrations[0]

@@ -3,6 +3,7 @@
 import asyncio
 import getpass
 import logging
+import os
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -15,11 +16,15 @@ from station.calibration.model import Check, Refusal, stamp
 from station.calibration.report import refusal_files
 from station.calibration.rig import Place, Unit
 from station.calibration.store import PAGE, CalibrationStore
-from station.commands.calibration_rig import cancelled_by_signals, open_rig, show
+from station.commands.calibration_rig import cancelled_by_signals, lock_devices, open_rig, show
 from station.commands.calibration_storage import store_calibration
 from station.commands.simulated_unit import calibrate_simulated_unit
 from station.config_option import config_option
+from station.devices.camera.open import camera_from
 from station.errors import BadInputError
+from station.records.database import records_folder
+from station.records.direct_transaction import direct_transaction
+from station.runtime.devices.gel_change import store_gel_change
 from station.settings.configuration import Configuration, load_configuration
 
 
@@ -120,7 +125,7 @@ def _print_checks(checks: tuple[Check, ...]) -> None:
 @calibrate.command("simulated")
 @config_option
 def simulated_command(config: Path | None) -> None:
-    """Calibrate the twin's sensor if it never was, in a few seconds: on a drawn ball at three places.
+    """Calibrate the twin's sensor if no calibration is in force, in a few seconds: on a drawn ball at three places.
 
     No device is used, so the station and the twin may run meanwhile. The ball is drawn at the twin's usual scale.
     """
@@ -132,6 +137,25 @@ def simulated_command(config: Path | None) -> None:
         )
     made = calibrate_simulated_unit(site, getpass.getuser())
     click.echo(f"calibration {made.summary()}" if made else "it is calibrated already; see station calibrate list")
+
+
+@calibrate.command("gel-changed")
+@click.option("--operator", default=getpass.getuser, show_default="the user", help="Who changed the gel.")
+@config_option
+def gel_changed_command(operator: str, config: Path | None) -> None:
+    """Note that the sensor's gel was changed: its calibrations measure no fruit any more, until the next one.
+
+    The station must not run meanwhile; while it runs, use the button on the page Maintenance, Sensor.
+    """
+    site = load_configuration(config)
+    serial = camera_from(site.camera).description.serial
+    if not serial:
+        raise BadInputError(f"camera.driver: {site.camera.driver} is no sensor that could be calibrated")
+    os.close(lock_devices(site))  # given back at once: the transaction below may have to migrate the records
+    with direct_transaction(records_folder(site.home)) as connection:
+        old = store_gel_change(connection, site.home, serial, operator, "service")
+    was = f"its calibration {old} is not in force any more" if old else "it had no calibration in force"
+    click.echo(f"sensor {serial}: {was}; calibrate it with the new gel: station calibrate")
 
 
 @calibrate.command("list")
@@ -148,6 +172,8 @@ def list_command(config: Path | None) -> None:
         click.echo("nothing is calibrated yet; see station calibrate --help")
     for serial, calibration, verified in rows:
         state = "" if verified is None else f", verified {verified.id}: {'PASS' if verified.passed else 'FAIL'}"
+        if store.is_of_earlier_gel(calibration):
+            state += ", of an earlier gel: not in force"
         click.echo(f"{serial:16}{calibration.summary()}, by {calibration.operator}{state}")
 
 

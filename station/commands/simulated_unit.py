@@ -18,7 +18,7 @@ PLACES = (Place(-2.5, 0.0), Place(0.0, 3.0))
 
 
 def calibrate_simulated_unit(site: Configuration, operator: str) -> Calibration | None:
-    """Calibrate the twin's sensor if it never was, in a few seconds; None if the unit has a calibration already.
+    """Calibrate the twin's sensor if it has no calibration in force, in a few seconds; None if it has one.
 
     The ball is drawn as the twin draws it, at the gripper's counts and with the sensor's noise; arm, gripper and frames
     do not go over the wire, which would take minutes. All else is what `station calibrate` does and stores.

@@ -67,6 +67,8 @@ def _calibration(store: CalibrationStore, serial: str, site: Configuration) -> C
     calibration = store.current(serial)
     if calibration is not None:
         return calibration
+    if (changed := store.gel_change(serial)) is not None:
+        raise CalibrationError(changed.words())
     others = ", ".join(store.serials())
     known = f"calibrated are: {others}: is this the right sensor? Else" if others else "nothing is calibrated yet:"
     raise CalibrationError(f"unit {serial} has no calibration in {site.home}; {known} run `station calibrate`")

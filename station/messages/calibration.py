@@ -4,6 +4,7 @@ from station.messages.message import Listed, Nested, Number, define, define_plur
 
 A_CALIBRATION = define("calibration.a_calibration", "a calibration")
 A_VERIFICATION = define("calibration.a_verification", "a verification")
+A_GEL_CHANGE = define("calibration.a_gel_change", "a change of the gel")
 
 # Titles of the steps.
 STEP_UNTOUCHED = define("calibration.step_untouched", "the untouched gel")
@@ -221,6 +222,11 @@ REQUIRED = define(
     "calibration.required",
     "The sensor is not calibrated: calibrate it with the ball on the page Maintenance in manual mode, or by `station "
     "calibrate` with the station stopped.",
+)
+GEL_CHANGED = define(
+    "calibration.gel_changed",
+    "The sensor's gel was changed ({at}, {operator}): calibrate it with the ball on the page Maintenance in manual "
+    "mode, or by `station calibrate` with the station stopped.",
 )
 NEVER_VERIFIED = define(
     "calibration.never_verified",

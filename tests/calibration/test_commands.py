@@ -6,6 +6,7 @@ import subprocess
 
 import pytest
 
+from station.calibration.report import calibration_files
 from station.calibration.store import CalibrationStore
 from station.records.open import lock_folder
 
@@ -139,11 +140,51 @@ def test_nothing_is_verified_without_a_calibration_of_this_very_unit(site):
     assert "calibrated are: D11111: is this the right sensor?" in done.stderr
 
 
+def test_after_a_changed_gel_nothing_is_verified_by_the_old_calibration_which_old_images_are_measured_by(
+    site, draft, station_here, tmp_path
+):
+    store, here = CalibrationStore(site.home), ("--config", site.configuration)
+    done = station_here("calibrate", "gel-changed", "--operator", "ben", *here)
+    assert done.returncode == 0, done.stderr
+    assert f"sensor {site.serial}: it had no calibration in force; calibrate it" in done.stdout
+    calibration = draft.calibration.model_copy(update={"serial": site.serial})
+    store.add_calibration(calibration, calibration_files(draft))
+    golden = site.home / "golden_reference.png"
+    golden.write_bytes(b"of the old gel")
+    assert "not in force" not in station_here("calibrate", "list", *here).stdout
+
+    done = station_here("calibrate", "gel-changed", "--operator", "ben", *here)
+    assert done.returncode == 0, done.stderr
+    assert f"its calibration {calibration.id} is not in force any more; calibrate it" in done.stdout
+    assert not golden.exists()
+    assert "of an earlier gel: not in force" in station_here("calibrate", "list", *here).stdout
+    trail = station_here("audit", "show", *here).stdout
+    assert trail.count("calibration.gel_changed") == 2
+    verified = site.station("verify", "--yes")
+    assert verified.returncode == 1
+    assert "ben): calibrate it with the ball" in verified.stderr
+
+    folder = store.folder(calibration)
+    images = ["--reference", folder / "reference.png", "--out", tmp_path / "out", folder / "press_07.png"]
+    analyzed = site_analyze(site, "--unit", site.serial, *images)
+    assert analyzed.returncode == 0, analyzed.stderr
+    assert f"calibration {calibration.id} of {site.serial}" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_no_gel_of_a_camera_that_is_no_sensor_is_changed(tmp_path, station_here):
+    configuration = tmp_path / "station.yaml"
+    configuration.write_text("home: home\ncamera: {driver: replay}\n")
+    done = station_here("calibrate", "gel-changed", "--config", configuration)
+    assert done.returncode == 2
+    assert "replay is no sensor that could be calibrated" in done.stderr
+    assert not (tmp_path / "home").exists()
+
+
 def test_a_running_station_keeps_its_devices(site, tmp_path):
     lock = lock_folder(site.home / "records")
     try:
         grip = ("grip", "--recipe", "rubber_ball", "--out", tmp_path / "grip")
-        for command in (("calibrate", "--yes"), ("verify", "--yes"), grip):
+        for command in (("calibrate", "--yes"), ("verify", "--yes"), ("calibrate", "gel-changed"), grip):
             done = site.station(*command)
             assert done.returncode == 1
             assert "the devices are in use" in done.stderr

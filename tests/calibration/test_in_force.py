@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import os
 import subprocess
 import time
 import urllib.request
@@ -10,7 +11,8 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from station.calibration.model import Check, Verification, stamp
+from station.calibration import store as calibration_store
+from station.calibration.model import Check, GelChange, Verification, stamp
 from station.calibration.report import calibration_files
 from station.calibration.store import CalibrationStore
 from station.channel.client import ChannelClient
@@ -146,6 +148,39 @@ def test_a_sensor_without_a_calibration_is_refused_and_an_alarm_unless_it_is_all
     allowed = in_use(tmp_path, made_at, "D11111", uncalibrated="allow")
     assert (allowed.refusal(), allowed.alarm_detail()) == (None, None)
     assert "allowed by service.uncalibrated" in str(allowed.in_force.words)
+
+
+GEL_CHANGE = GelChange(operator="ben", changed_at=datetime(2026, 11, 29, 10, 15, tzinfo=UTC))
+
+
+def test_after_a_changed_gel_the_sensor_is_refused_with_who_and_when_until_it_is_calibrated(stored, draft, tmp_path):
+    made_at = draft.calibration.made_at
+    required, allowed = in_use(tmp_path, made_at), in_use(tmp_path, made_at, uncalibrated="allow")
+    assert required.refusal() is None
+    stored.mark_gel_changed("T0001", GEL_CHANGE)
+    assert (required.calibration, required.golden(), required.gate_factor) == (None, None, 1.0)
+    assert "gel was changed (2026-11-29 10:15 UTC, ben): calibrate it" in str(required.refusal())
+    assert required.alarm_detail() == required.refusal()
+    assert (allowed.refusal(), allowed.alarm_detail()) == (None, None)
+    assert allowed.in_force.words == messages.NONE_ALLOWED(scale_mm=0.0266)
+    new = draft.calibration.model_copy(update={"id": stamp(made_at + timedelta(hours=1))})
+    stored.add_calibration(new, {})
+    assert (required.calibration, required.refusal(), required.alarm_detail()) == (new, None, None)
+
+
+def test_a_changed_gel_is_seen_where_the_kernels_clock_did_not_move_meanwhile(stored, draft, tmp_path, monkeypatch):
+    folder = tmp_path / "calibrations" / "T0001"
+    tick_ns = folder.stat().st_mtime_ns
+    write, calibrated = calibration_store.write_atomically, in_use(tmp_path, draft.calibration.made_at)
+
+    def within_a_tick(path, data):
+        write(path, data)
+        os.utime(folder, ns=(tick_ns, tick_ns))
+
+    monkeypatch.setattr(calibration_store, "write_atomically", within_a_tick)
+    assert calibrated.calibration == draft.calibration
+    stored.mark_gel_changed("T0001", GEL_CHANGE)
+    assert calibrated.calibration is None
 
 
 @pytest.mark.timeout(600)

@@ -2,12 +2,13 @@
 
 import errno
 import os
-from datetime import timedelta
+import shutil
+from datetime import UTC, datetime, timedelta
 
 import pytest
 
 from station.calibration.errors import CalibrationError, UnknownCalibrationError
-from station.calibration.model import Verification, stamp
+from station.calibration.model import GelChange, Verification, stamp
 from station.calibration.report import calibration_files
 from station.calibration.store import CALIBRATIONS
 
@@ -116,3 +117,61 @@ def test_a_prepared_one_is_in_force_by_its_folders_name_alone_and_can_be_taken_b
     prepared.discard()
     prepared.discard()
     assert list((tmp_path / CALIBRATIONS / "T0001").iterdir()) == []
+
+
+GEL_CHANGE = GelChange(operator="ben", changed_at=datetime(2026, 11, 29, 10, 15, tzinfo=UTC))
+
+
+def made_after(draft, **later):
+    return draft.calibration.model_copy(update={"id": stamp(draft.calibration.made_at + timedelta(**later))})
+
+
+def test_a_changed_gel_leaves_no_calibration_in_force_and_none_returns(stored, draft):
+    newer, others = made_after(draft, days=1), draft.calibration.model_copy(update={"serial": "T0002"})
+    stored.add_calibration(newer, {})
+    stored.add_calibration(others, {})
+    assert stored.gel_change("T0001") is None
+    stored.mark_gel_changed("T0001", GEL_CHANGE)
+    assert stored.current("T0001") is None
+    assert stored.gel_change("T0001") == GEL_CHANGE
+    assert stored.calibrations("T0001") == (newer, draft.calibration), "old images are measured by them"
+    assert stored.current("T0002") == others
+    shutil.move(stored.folder(newer), stored.folder(newer).with_name(".moved_away"))
+    assert stored.current("T0001") is None
+
+
+@pytest.mark.parametrize("days", [1, -1])
+def test_the_calibration_after_a_changed_gel_is_in_force_also_where_the_clock_was_set_back(stored, draft, days):
+    stored.mark_gel_changed("T0001", GEL_CHANGE)
+    new = made_after(draft, days=days)
+    stored.add_calibration(new, {})
+    assert stored.current("T0001") == new
+    assert [stored.is_of_earlier_gel(one) for one in (draft.calibration, new)] == [True, False]
+
+
+def test_a_mark_that_cannot_be_read_counts_and_a_unit_without_a_calibration_gets_none(stored, draft, tmp_path):
+    stored.mark_gel_changed("T0002", GEL_CHANGE)
+    assert not (tmp_path / CALIBRATIONS / "T0002").exists()
+    (tmp_path / CALIBRATIONS / "T0001" / f"{draft.calibration.id}.gel_changed").write_bytes(b"\0")
+    assert stored.current("T0001") is None
+    assert stored.gel_change("T0001") is None
+
+
+@pytest.mark.parametrize("number", [1, 3])
+def test_a_full_disk_leaves_the_newest_in_force_and_no_older_one(stored, draft, monkeypatch, number):
+    newer, calls, synced = made_after(draft, days=1), 0, os.fsync
+    stored.add_calibration(newer, {})
+
+    def full(descriptor):
+        nonlocal calls
+        calls += 1
+        if calls == number:  # a mark's content, and then its name
+            raise OSError(errno.ENOSPC, "No space left on device")
+        synced(descriptor)
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(CalibrationError, match="No space left on device; free space there"):
+        stored.mark_gel_changed("T0001", GEL_CHANGE)
+    assert stored.current("T0001") == newer
+    stored.mark_gel_changed("T0001", GEL_CHANGE)
+    assert stored.current("T0001") is None

@@ -41,6 +41,7 @@ ORDERS = {
     "/maintenance/sensor/begin": Right.MAINTAIN,
     "/maintenance/sensor/go-on": Right.MAINTAIN,
     "/maintenance/sensor/end": Right.MAINTAIN,
+    "/maintenance/sensor/gel-changed": Right.MAINTAIN,
     "/maintenance/configuration": Right.CONFIGURE,
     "/maintenance/configuration/former": Right.CONFIGURE,
     "/people/put": Right.MANAGE_PEOPLE,

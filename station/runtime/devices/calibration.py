@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from station.calibration.checks import check_name
-from station.calibration.model import Calibration, Verification
+from station.calibration.model import Calibration, GelChange, Verification
 from station.calibration.store import CALIBRATIONS, REFERENCE, VERIFICATIONS, CalibrationStore
 from station.messages import calibration as messages
 from station.messages.message import Message
@@ -47,6 +47,8 @@ class ActiveCalibration:
         self._seen: object = None
         self._calibration: Calibration | None = None
         self._verification: Verification | None = None
+        self._gel_change: GelChange | None = None
+        """Why there is no calibration in force, where that is so."""
 
     @property
     def calibration(self) -> Calibration | None:
@@ -92,7 +94,7 @@ class ActiveCalibration:
         """Return why inspections are refused, with the remedy; None if all that is required was done."""
         limit_h, calibration = self._settings.verify_every_h, self.calibration
         if calibration is None and (self._required or limit_h is not None):
-            return messages.REQUIRED()
+            return self._gel_change.words() if self._gel_change else messages.REQUIRED()
         if limit_h is None:
             return None
         verified, age_s = self._verification, self.figures.verification_age_s
@@ -110,7 +112,8 @@ class ActiveCalibration:
         calibration, verified = self.calibration, self._verification
         if calibration is None:
             needed = (self._required or self._settings.verify_every_h is not None) and self._serial()
-            return messages.MISSING() if needed else None
+            missing = self._gel_change.words() if self._gel_change else messages.MISSING()
+            return missing if needed else None
         # Why triggers are refused comes first; the failed checks, which say more of a failed verification, come below.
         if (why := self.refusal()) and (verified is None or verified.passed):
             return why
@@ -128,6 +131,7 @@ class ActiveCalibration:
         if not serial or seen == self._seen:
             return
         self._calibration = self._store.current(serial)
+        self._gel_change = self._store.gel_change(serial) if self._calibration is None else None
         self._verification = None if self._calibration is None else self._store.last_verification(self._calibration)
         self._seen = seen
 

@@ -21,8 +21,8 @@ GOLDEN = "golden_reference.png"
 class GoldenReference:
     """Golden reference: the gel when a person last checked that it was clean, stored in the home folder.
 
-    For a calibrated sensor it is the calibration's. Else it is the first reference that is taken; after a change of
-    the gel or its cleaning, a person removes the file and the next reference replaces it.
+    For a calibrated sensor it is the calibration's. Else it is the first reference that is taken; a noted change of the
+    gel removes the file, or a person after its cleaning, and the next reference replaces it.
     """
 
     def __init__(self, state_files: StateFiles, calibrated: Callable[[], Path | None] = lambda: None) -> None:

@@ -25,6 +25,7 @@ from station.channel.panel_maintenance import (
     ContinueCalibrationRun,
     EndCalibrationRun,
     GetCalibration,
+    NoteGelChange,
     RunStep,
     StartCalibrationRun,
 )
@@ -40,8 +41,10 @@ from station.messages.operation import internal_fault
 from station.records.audit import AuditEntry, append_audit
 from station.records.records import Records
 from station.runtime.devices.calibration_rig import CalibrationRig, Refusals
+from station.runtime.devices.gel_change import store_gel_change
 from station.runtime.observability.audit_logger import AuditLogger, calibration_entry, verification_entry
 from station.runtime.production.production import Production
+from station.runtime.rpc.maintenance import PanelMaintenance
 from station.settings.configuration import Configuration
 from station.settings.recipe import find_recipe
 from station.settings.recipe_model import Recipe
@@ -80,7 +83,7 @@ class PanelCalibration:
 
     Args:
         worker: reads and writes files in its thread.
-        refusal: returns why nothing may be moved by hand now.
+        maintenance: returns why nobody may work, or move anything, by hand now.
     """
 
     def __init__(
@@ -90,10 +93,10 @@ class PanelCalibration:
         records: Records,
         audit: AuditLogger,
         worker: PanelWorker,
-        refusal: Callable[[], Message | None],
+        maintenance: PanelMaintenance,
     ) -> None:
         self._site, self._service, self._devices = configuration, production.service, production.devices
-        self._records, self._audit, self._worker, self._refusal = records, audit, worker, refusal
+        self._records, self._audit, self._worker, self._maintenance = records, audit, worker, maintenance
         self._store = CalibrationStore(configuration.home)
         self._run: _Run | None = None
         self.handlers: Handlers = {
@@ -101,6 +104,7 @@ class PanelCalibration:
             StartCalibrationRun: self.begin,
             ContinueCalibrationRun: self.go_on,
             EndCalibrationRun: self.end,
+            NoteGelChange: self.note_gel_change,
         }
 
     async def close(self) -> None:
@@ -134,12 +138,13 @@ class PanelCalibration:
             trouble=self._devices.calibration.refusal() or self._devices.calibration.alarm_detail(),
             ball_mm=settings.ball_mm,
             run=None if self._run is None else _run_view(self._run),
-            run_refused=self._why_not(serial),
+            run_refused=self._run_refusal(serial),
+            gel_change_refused=self._gel_change_refusal(serial),
         )
 
     async def begin(self, request: StartCalibrationRun) -> CalibrationRunView:
         """Start a run; the gripper closes on the ball."""
-        if why := self._why_not(self._devices.cell.camera.description.serial):
+        if why := self._run_refusal(self._devices.cell.camera.description.serial):
             raise StationError(why)
         run = self._run = _Run(request.kind, request.actor)
         self._note(request.actor, "calibration.begun")
@@ -172,12 +177,28 @@ class PanelCalibration:
             await self.close()
         return _run_view(run)
 
-    def _why_not(self, serial: str) -> Message | None:
+    async def note_gel_change(self, request: NoteGelChange) -> CalibrationState:
+        """Take the sensor's calibrations out of force."""
+        serial, actor = self._devices.cell.camera.description.serial, request.actor
+        if why := self._gel_change_refusal(serial):
+            raise StationError(why)
+        with self._service.manual(messages.A_GEL_CHANGE(), self.close):  # until it is stored no fruit is accepted
+            await self._records.change_to_end(
+                lambda connection: store_gel_change(connection, self._site.home, serial, actor.who, actor.role)
+            )
+        return await self.state(GetCalibration())
+
+    def _run_refusal(self, serial: str) -> Message | None:
+        return self._unavailable(serial) or self._maintenance.refusal() or self._motion_refusal()
+
+    def _gel_change_refusal(self, serial: str) -> Message | None:
+        # Also with the cell made safe, as for the change itself: nothing moves.
+        return self._unavailable(serial) or self._maintenance.work_refusal()
+
+    def _unavailable(self, serial: str) -> Message | None:
         if activity := self._service.manual_activity:
             return UNDER_WAY(activity=activity)
-        if not serial:
-            return messages.NO_SENSOR()
-        return self._refusal() or self._motion_refusal()
+        return None if serial else messages.NO_SENSOR()
 
     def _motion_refusal(self) -> Message | None:
         """Return why a run may move nothing now but jaws that open."""

@@ -95,19 +95,24 @@ class PanelMaintenance:
 
     def refusal(self) -> Message | None:
         """Return why nothing may be moved by hand now, with the remedy; None if it may."""
-        service, facts, mode = self._service, STATES[self._service.state], self._plc_commands.mode
-        if service.ending:
-            return messages.ENDING()
-        if facts.refusal is Refusal.BUSY:
-            return messages.BUSY()
-        if mode != MANUAL:
-            return messages.SET_MANUAL(mode=mode, manual=MANUAL)
+        service = self._service
+        if why := self.work_refusal():
+            return why
         if service.state not in _JOGGED:
-            return facts.activity
+            return STATES[service.state].activity
         activity = service.manual_activity
         if activity is not None and not self._moving.locked():
             return messages.UNDER_WAY(activity=activity)
         return None
+
+    def work_refusal(self) -> Message | None:
+        """Return why nobody may work by hand now, also without a motion; None where no fruit can be inspected."""
+        mode = self._plc_commands.mode
+        if self._service.ending:
+            return messages.ENDING()
+        if STATES[self._service.state].refusal is Refusal.BUSY:
+            return messages.BUSY()
+        return None if mode == MANUAL else messages.SET_MANUAL(mode=mode, manual=MANUAL)
 
     async def health(self, _request: GetHealth) -> Health:
         """Return the health of all dependencies."""

@@ -31,7 +31,7 @@ class PanelPages:
         recipes = PanelRecipes(configuration.home, configuration.recipes_folder, self._worker)
         maintenance = PanelMaintenance(production, observability, configuration.home, self._worker, self._log)
         self._ball = PanelCalibration(
-            configuration, production, records, observability.audit, self._worker, maintenance.refusal
+            configuration, production, records, observability.audit, self._worker, maintenance
         )
         self.handlers: Handlers = {
             **history.handlers,

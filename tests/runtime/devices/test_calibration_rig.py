@@ -7,12 +7,14 @@ from typing import Any
 
 import pytest
 
-from station.channel.panel_maintenance import ContinueCalibrationRun, StartCalibrationRun
+from station.channel.panel_maintenance import ContinueCalibrationRun, NoteGelChange, StartCalibrationRun
 from station.devices.gripper.errors import GripperNotActiveError
 from station.devices.gripper.interface import GripperReading, MoveResult, ObjectState
 from station.errors import StationError
 from station.inspection.states import STATES, State
 from station.messages import gripper as gripper_messages
+from station.messages.calibration import A_CALIBRATION
+from station.messages.maintenance import BUSY, UNDER_WAY
 from station.messages.operation import INTERNAL_FAULT
 from station.press.rig import GripError
 from station.runtime.devices.manager import DeviceManager
@@ -80,7 +82,7 @@ class Panel:
     """A panel's calibration over a cycle whose state is set by hand."""
 
     def __init__(self, home: Any) -> None:
-        self.devices, self.service = Devices(), Service()
+        self.devices, self.service, self.work_refusal = Devices(), Service(), None
         camera: Any = SimpleNamespace(description=SimpleNamespace(serial="D1"))
         gripper_and_arm: Any = self.devices
         cell = Cell(camera, gripper_and_arm, gripper_and_arm)
@@ -88,8 +90,9 @@ class Panel:
         devices = DeviceManager(Configuration(home=home), lambda *_: None, lambda _: None)
         devices.cell, devices._arm = cell, gripper_and_arm
         production: Any = SimpleNamespace(service=self.service, devices=devices)
+        maintenance: Any = SimpleNamespace(refusal=lambda: None, work_refusal=lambda: self.work_refusal)
         unused: Any = None
-        self.calibration = PanelCalibration(site, production, unused, unused, unused, lambda: None)
+        self.calibration = PanelCalibration(site, production, unused, unused, unused, maintenance)
         self.run = _Run("calibration", MAX)
         self.rig = self.calibration._rig(self.run, find_recipe("rubber_ball"))
 
@@ -175,6 +178,22 @@ def test_no_run_begins_while_a_judged_fruit_may_be_between_the_jaws(panel):
         asyncio.run(panel.calibration.begin(StartCalibrationRun(kind="calibration", actor=MAX)))
     assert refused.value.message == STATES[State.CARRIED].activity
     assert panel.calibration._run is None
+
+
+def test_no_change_of_the_gel_is_noted_in_an_inspection_or_a_run(panel):
+    for panel.work_refusal, panel.service.manual_activity, why in (
+        (BUSY(), None, BUSY()),
+        (None, A_CALIBRATION(), UNDER_WAY(activity=A_CALIBRATION())),
+    ):
+        with pytest.raises(StationError) as refused:
+            asyncio.run(panel.calibration.note_gel_change(NoteGelChange(actor=MAX)))
+        assert refused.value.message == why
+
+
+def test_a_change_of_the_gel_is_noted_also_with_the_cell_made_safe(panel):
+    panel.service.state = State.LATCHED
+    assert panel.calibration._run_refusal("D1") == STATES[State.LATCHED].activity
+    assert panel.calibration._gel_change_refusal("D1") is None
 
 
 def test_a_run_that_a_bug_ends_has_failed(panel, monkeypatch):
