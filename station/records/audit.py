@@ -12,6 +12,7 @@ from station.messages import records as messages
 from station.records.audit_head import FILE_NAME as HEAD_NAME
 from station.records.audit_head import Head
 from station.records.errors import BadRecordError
+from station.records.origin import begin_origin
 from station.records.schema import audit
 
 GENESIS = "0" * 64
@@ -92,7 +93,9 @@ def append_audit(connection: Connection, entry: AuditEntry) -> AuditRow:
 
 
 def continue_audit(connection: Connection, known: Head | None) -> AuditRow | None:
-    """Append, at a start, a row if the head stored outside the database, or its absence, shows that rows are lost.
+    """Append a row if the head stored outside the database, or its absence, shows that rows are lost.
+
+    Then the outbox too continues without its last entries: that row is the first entry of a new origin.
 
     Returns:
         That row, with the last row in this database as `old` and the last one known as `new`; None if no row is
@@ -106,6 +109,7 @@ def continue_audit(connection: Connection, known: Head | None) -> AuditRow | Non
     else:
         reason = "the last rows of the trail are not in this database: it was replaced, cut or begun anew"
     entry = AuditEntry(STATION, STATION, CONTINUED, "audit", reason, _named(last), _named(known))
+    begin_origin(connection)
     return _append(connection, entry, last, max(head.seq for head in (last, known) if head) + _SPARE_NUMBERS)
 
 

@@ -3,12 +3,11 @@
 import os
 import shutil
 import sqlite3
-import uuid
 from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
-from sqlalchemy import delete, func, insert, select
+from sqlalchemy import delete
 
 from station.atomic_file import sync_file, sync_folder
 from station.messages import records as messages
@@ -22,8 +21,9 @@ from station.records.high_water_mark import MARK_NAME, HighWaterMark
 from station.records.images import FOLDER_NAME, image_path
 from station.records.migration import migrate
 from station.records.open import BELONGING, RESTORING, lock_folder
+from station.records.origin import begin_origin
 from station.records.retention import forget_missing, referred
-from station.records.schema import inspections, origins, outbox
+from station.records.schema import inspections
 from station.records.schema_check import check_schema
 from station.records.signing import PublicKeys
 
@@ -131,8 +131,7 @@ def _continue(folder: Path, new: Path, manifest: Manifest, by: str) -> Head | No
     try:
         migrate(engine, new)
         with engine.begin() as connection:
-            after = (connection.scalar(select(func.max(outbox.c.entry))) or 0) + 1
-            connection.execute(insert(origins).values(first_entry=after, id=uuid.uuid4().hex).prefix_with("OR REPLACE"))
+            begin_origin(connection)
             told = {"made_utc_ms": manifest.made_utc_ms, "inspections": manifest.inspections}
             append_restored(connection, by, read_head(folder), told)
             # What ran when the backup was made has ended since: its outcome is not in the backup, and a start would

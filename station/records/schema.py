@@ -174,8 +174,8 @@ origins = Table(
     Column("first_entry", Integer, primary_key=True, autoincrement=False),
     Column("id", Text, nullable=False),
 )
-"""The database that numbered the entries from `first_entry` on: a new one after each restore, so that a number given
-again is not taken for the one given before."""
+"""The database that numbered the entries from `first_entry` on: a new one after each restore, also where a
+copy was put back by hand, so that a number given again is not taken for the one given before."""
 
 curve_points = Table(
     "curve_points",

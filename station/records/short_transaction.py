@@ -6,7 +6,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection
 
-from station.records.audit import newer_head
+from station.records.audit import continue_audit, newer_head
 from station.records.audit_head import read_head, try_save_head
 from station.records.database import existing, open_engine
 from station.records.error_mapping import map_error
@@ -23,10 +23,12 @@ def short_transaction(folder: Path) -> Iterator[Connection]:
     path = existing(folder)
     try:
         with open_engine(path, "rw").begin() as connection:
+            head = read_head(folder)
+            continue_audit(connection, head)
             yield connection
-            head = newer_head(connection, read_head(folder))
-        if head is not None:
-            try_save_head(folder, head)
+            ahead = newer_head(connection, head)
+        if ahead is not None:
+            try_save_head(folder, ahead)
     except RecordsError:
         raise
     except Exception as error:

@@ -1,5 +1,7 @@
-"""Age of the outbox's next entry: counted from the last change of its inspection or lot."""
+"""The outbox's feed: the age of its next entry, and its origin where the database is an older copy."""
 
+import asyncio
+import shutil
 import sqlite3
 import time
 from contextlib import closing
@@ -8,10 +10,15 @@ import pytest
 from sqlalchemy import Engine, event
 
 from station.outbox.feed import read_batch
+from station.records.audit import AuditEntry, append_audit
+from station.records.audit_head import FILE_NAME as HEAD_NAME
 from station.records.database import FILE_NAME
+from station.records.direct_transaction import direct_transaction
 from station.records.lots import end_lot, start_lot
+from station.records.records import Records
 from station.records.retention import remove_oldest_images
 from station.records.short_transaction import short_transaction
+from station.settings.records import RecordsSettings
 
 DAY_MS = 86_400_000
 IDA = ("Ida", "operator")
@@ -73,3 +80,70 @@ def test_what_dates_an_entry_is_found_by_keys_and_not_among_all_entries_ever_mad
     (plan,) = plans
     assert any(step.startswith("SEARCH audit USING INTEGER PRIMARY KEY") for step in plan), plan
     assert any(step.startswith("SEARCH outbox USING INTEGER PRIMARY KEY") for step in plan), plan
+
+
+def start_station(folder):
+    """Start a station, and end it."""
+
+    async def steps():
+        await (await Records.open(folder, RecordsSettings(deadline_s=20.0, free_reserve_mb=1), "boot")).close()
+
+    asyncio.run(steps())
+
+
+def by_command(folder, transaction=direct_transaction):
+    """Write as a person's command does."""
+    with transaction(folder) as connection:
+        append_audit(connection, AuditEntry("ada", "quality", "tried", "nothing"))
+
+
+WRITES = {
+    "start of the station": start_station,
+    "command": by_command,
+    "command beside the station": lambda folder: by_command(folder, short_transaction),
+}
+"""What may write first."""
+
+
+@pytest.mark.parametrize("write", WRITES.values(), ids=WRITES)
+def test_an_old_copy_put_back_by_hand_has_a_new_origin_from_its_end_on(fill, tmp_path, write):
+    folder, copy = tmp_path / "records", tmp_path / "copy"
+    fill(folder, 1, 5, steps=0)
+    by_command(folder)
+    shutil.copyfile(folder / FILE_NAME, copy)
+    at_copy = read_batch(folder, "s", 0).last
+    fill(folder, 6, 8, steps=0)
+    by_command(folder)
+    before = read_batch(folder, "s", 0)
+    published = {before.lineage[0].id: before.last}
+    for name in (FILE_NAME, f"{FILE_NAME}-wal", f"{FILE_NAME}-shm"):
+        (folder / name).unlink(missing_ok=True)
+    shutil.copyfile(copy, folder / FILE_NAME)
+    write(folder)
+    fill(folder, 9, 10, steps=0)
+    after = read_batch(folder, "s", 0)
+    assert after.lineage[0].id not in published
+    assert after.known(published) == at_copy
+    write(folder)
+    assert read_batch(folder, "s", 0).lineage == after.lineage, "and no other one with each write"
+
+
+@pytest.mark.parametrize("write", WRITES.values(), ids=WRITES)
+def test_a_start_and_a_command_leave_the_origin(fill, tmp_path, write):
+    fill(tmp_path, 1, 5, steps=0)
+    lineage = read_batch(tmp_path, "s", 0).lineage
+    write(tmp_path)
+    start_station(tmp_path)
+    by_command(tmp_path)
+    assert read_batch(tmp_path, "s", 0).lineage == lineage
+
+
+def test_a_lost_head_of_the_audit_trail_costs_the_origin_and_no_entry(fill, tmp_path):
+    fill(tmp_path, 1, 5, steps=0)
+    start_station(tmp_path)
+    before = read_batch(tmp_path, "s", 0)
+    (tmp_path / HEAD_NAME).unlink()
+    start_station(tmp_path)
+    after = read_batch(tmp_path, "s", 0)
+    assert [origin.last_entry for origin in after.lineage] == [None, before.last]
+    assert after.known({before.lineage[0].id: 3}) == 3

@@ -4,6 +4,7 @@ import asyncio
 import json
 import os
 import random
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -22,6 +23,7 @@ from station.outbox.postgresql import Postgresql
 from station.records.audit import AuditEntry, append_audit
 from station.records.backup import make_backup
 from station.records.database import FILE_NAME
+from station.records.direct_transaction import direct_transaction
 from station.records.lots import end_lot, start_lot
 from station.records.restore import restore_backup
 from station.records.short_transaction import short_transaction
@@ -147,6 +149,30 @@ def test_after_a_restoring_numbers_given_again_are_told(server, fill, tmp_path):
     count = asyncio.run(publish_all(server, folder, "restored"))
     assert count == 1 + 2, "the restoring itself, two inspections, and not all from the first again"
     found = rows(server, "SELECT sequence FROM inspections WHERE station = 'restored' ORDER BY sequence")
+    assert [number for (number,) in found] == [*range(1, 11)]
+
+
+def test_after_an_old_copy_was_put_back_by_hand_its_numbers_given_again_are_published(server, fill, tmp_path):
+    folder, copy = tmp_path / "records", tmp_path / "copy"
+
+    def audit():
+        with direct_transaction(folder) as connection:
+            append_audit(connection, AuditEntry("ada", "quality", "tried", "nothing"))
+
+    fill(folder, 1, 5, steps=0)
+    audit()
+    shutil.copyfile(folder / FILE_NAME, copy)
+    fill(folder, 6, 8, steps=0)
+    audit()
+    asyncio.run(publish_all(server, folder, "put-back"))
+    for name in (FILE_NAME, f"{FILE_NAME}-wal", f"{FILE_NAME}-shm"):
+        (folder / name).unlink(missing_ok=True)
+    shutil.copyfile(copy, folder / FILE_NAME)
+    audit()
+    fill(folder, 9, 10, steps=0)
+    count = asyncio.run(publish_all(server, folder, "put-back"))
+    assert count == 2 + 2, "that the trail continues, its next row, two inspections, and not all from the first again"
+    found = rows(server, "SELECT sequence FROM inspections WHERE station = 'put-back' ORDER BY sequence")
     assert [number for (number,) in found] == [*range(1, 11)]
 
 

@@ -82,6 +82,7 @@ def test_an_earlier_form_is_brought_up_to_date_with_a_copy_kept(opened, scenario
     async def steps():
         async with opened() as records:
             await records.begin(trigger)
+        lineage = read_batch(folder, "s", 0).lineage
         next_form()
         (folder / "backups").mkdir()
         (folder / "backups" / f"20260101T000000Z-form-{head}.partial").write_text("of a start that was killed")
@@ -92,6 +93,7 @@ def test_an_earlier_form_is_brought_up_to_date_with_a_copy_kept(opened, scenario
         assert backup.name.endswith(f"-form-{head}.sqlite3")
         assert query(backup, "SELECT sequence, outcome FROM inspections") == [(1, None)]
         assert query(folder / FILE_NAME, "SELECT grower FROM inspections") == [(None,), (None,)]
+        assert read_batch(folder, "s", 0).lineage == lineage
 
     scenario(steps)
 
