@@ -9,16 +9,12 @@ import click
 
 from station.calibration.errors import CalibrationError
 from station.calibration.model import Calibration
-from station.calibration.report import verification_files
 from station.calibration.store import PAGE, CalibrationStore
 from station.calibration.verification_procedure import VerificationProcedure, VerificationResult
 from station.commands.calibration_rig import cancelled_by_signals, open_rig, show
+from station.commands.calibration_storage import store_verification
 from station.config_option import config_option
 from station.errors import StationError
-from station.records.audit import append_audit
-from station.records.database import records_folder
-from station.records.direct_transaction import direct_transaction
-from station.runtime.observability.audit_logger import verification_entry
 from station.settings.configuration import Configuration, load_configuration
 
 
@@ -50,12 +46,7 @@ def verify(operator: str, bench: bool, yes: bool, config: Path | None) -> None: 
         verified, calibration = asyncio.run(run())
     except asyncio.CancelledError:
         raise click.Abort from None
-    verification = verified.verification
-    with direct_transaction(records_folder(site.home)) as connection:
-        subject, passed = f"sensor {calibration.serial}", verification.passed
-        entry = verification_entry(operator, subject, calibration.id, verification.id, passed=passed)
-        append_audit(connection, entry)
-        folder = store.add_verification(verification, verification_files(verified, calibration))
+    verification, folder = verified.verification, store_verification(site, operator, verified, calibration)
     for check in verification.checks:
         click.echo(f"{'good' if check.passed else 'FAIL':6}{check.name:8}{check.found}, expected {check.expected}")
     click.echo(f"{'PASS' if verification.passed else 'FAIL'}; look at {folder / PAGE}")
