@@ -6,6 +6,7 @@ a mark `ID.gel_changed` beside each of the unit's calibrations, which takes it o
 """
 
 import contextlib
+import fcntl
 import os
 import shutil
 import tempfile
@@ -159,23 +160,24 @@ class CalibrationStore:
     def _prepare(self, kind: str, serial: str, name: str, record: Stored, files: Mapping[str, bytes]) -> "Prepared":
         # Validated as it names a folder: another text might lead out of the home folder.
         folder = self._home / kind / _SERIAL.validate_python(serial)
-        unfinished: Path | None = None
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            # A process that was killed left them.
-            for left in folder.glob(f"{_UNFINISHED}*"):
-                shutil.rmtree(left, ignore_errors=True)
-            unfinished = Path(tempfile.mkdtemp(dir=folder, prefix=_UNFINISHED))
-            # A folder of `mkdtemp` is readable for its user only.
-            unfinished.chmod(0o755)
-            for file, data in {**files, RECORDS[kind]: record.model_dump_json(indent=1).encode()}.items():
-                _write(unfinished / file, data)
-            sync_folder(unfinished)
+            with _locked(folder):  # a new folder is not locked at once
+                _remove_unfinished(folder)
+                unfinished = Path(tempfile.mkdtemp(dir=folder, prefix=_UNFINISHED))
+                prepared = Prepared(unfinished, folder / name)
+            try:
+                # A folder of `mkdtemp` is readable for its user only.
+                unfinished.chmod(0o755)
+                for file, data in {**files, RECORDS[kind]: record.model_dump_json(indent=1).encode()}.items():
+                    _write(unfinished / file, data)
+                sync_folder(unfinished)
+            except BaseException:
+                prepared.discard()
+                raise
         except OSError as error:
-            if unfinished is not None:
-                shutil.rmtree(unfinished, ignore_errors=True)
             raise _not_stored(folder / name, error) from error
-        return Prepared(unfinished, folder / name)
+        return prepared
 
     def _all(self, kind: str, serial: str, model: type[RecordT], *, of_present_gel: bool = False) -> Iterator[RecordT]:
         with contextlib.suppress(ValidationError):
@@ -190,11 +192,13 @@ class CalibrationStore:
 
 
 class Prepared:
-    """A record that is complete and durable, and not in force yet."""
+    """A record that is complete and durable, and not in force yet. Its folder is locked until then."""
 
     def __init__(self, unfinished: Path, folder: Path) -> None:
         self._unfinished, self._folder = unfinished, folder
         self._in_force = False
+        self._lock = contextlib.ExitStack()
+        self._lock.enter_context(_locked(unfinished))
 
     def put_in_force(self) -> Path:
         """Put the record in force by its folder's name alone, and return the folder.
@@ -210,6 +214,7 @@ class Prepared:
         except OSError as error:
             self.discard()
             raise _not_stored(self._folder, error) from error
+        self._lock.close()
         return self._folder
 
     def discard(self) -> None:
@@ -219,6 +224,25 @@ class Prepared:
                 self._folder.rename(self._unfinished)  # whole at once: a reader never finds a part of it
             self._in_force = False
         shutil.rmtree(self._unfinished, ignore_errors=True)
+        self._lock.close()
+
+
+@contextlib.contextmanager
+def _locked(folder: Path, flags: int = fcntl.LOCK_EX) -> Iterator[None]:
+    """Lock a folder; the kernel unlocks it where the process is killed."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        fcntl.flock(descriptor, flags)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _remove_unfinished(folder: Path) -> None:
+    """Remove what killed processes left; another process holds the lock of one that it prepares."""
+    for left in folder.glob(f"{_UNFINISHED}*"):
+        with contextlib.suppress(OSError), _locked(left, fcntl.LOCK_EX | fcntl.LOCK_NB):
+            shutil.rmtree(left, ignore_errors=True)
 
 
 def _not_stored(folder: Path, error: OSError) -> CalibrationError:

@@ -10,7 +10,7 @@ import pytest
 from station.calibration.errors import CalibrationError, UnknownCalibrationError
 from station.calibration.model import GelChange, Verification, stamp
 from station.calibration.report import calibration_files
-from station.calibration.store import CALIBRATIONS
+from station.calibration.store import CALIBRATIONS, CalibrationStore
 
 
 def test_what_is_stored_is_read_back_with_its_page_and_pictures(stored, draft):
@@ -102,6 +102,24 @@ def test_what_a_killed_one_left_is_never_seen_and_swept_away(store, draft, tmp_p
     assert store.serials() == ("T0001",)
     store.add_calibration(draft.calibration, {})
     assert not left.exists()
+
+
+def test_one_that_is_being_prepared_stays_where_another_process_adds_one(store, draft, tmp_path):
+    first = store.prepare_calibration(draft.calibration, {"reference.png": b"x"})
+    later = draft.calibration.model_copy(update={"id": stamp(draft.calibration.made_at + timedelta(days=1))})
+    CalibrationStore(tmp_path).add_calibration(later, {})
+    assert (first.put_in_force() / "reference.png").read_bytes() == b"x"
+
+
+def test_no_lock_is_left_of_one_that_is_in_force_or_discarded(store, draft, tmp_path):
+    def held_open():
+        return [file.name for file in os.scandir("/proc/self/fd") if str(tmp_path) in os.path.realpath(file.path)]
+
+    first, second = (store.prepare_calibration(draft.calibration, {}) for _ in range(2))
+    assert len(held_open()) == 2
+    second.discard()
+    first.put_in_force()
+    assert held_open() == []
 
 
 def test_a_prepared_one_is_in_force_by_its_folders_name_alone_and_can_be_taken_back(store, draft, tmp_path):
