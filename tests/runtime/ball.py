@@ -27,9 +27,9 @@ PRESSED_S = 240.0
 """Longest wait for a whole press of the ball, on a busy machine."""
 
 
-async def give(panel: ChannelClient, name: OperatorCommandName) -> OperatorCommandView:
+async def give(panel: ChannelClient, name: OperatorCommandName, argument: str = "") -> OperatorCommandView:
     """An order, to its end: the first answer may come before."""
-    order = OperatorCommand(person=MAX, order=name)
+    order = OperatorCommand(person=MAX, order=name, argument=argument)
     given = await panel.request(order, OperatorCommandView, deadline_s=20)
 
     async def ended() -> OperatorCommandView | None:

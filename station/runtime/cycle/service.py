@@ -149,13 +149,18 @@ class Service:
         """Let a stopped station make itself ready."""
         self._reset_given = True
 
+    def withdraw_reset(self) -> None:
+        """Let a stopped station make itself ready no more by a reset that was given."""
+        self._reset_given = False
+
     def set_mode(self, *, production: bool) -> None:
         """Reset automatically in production mode only: in another, people may reach into the cell.
 
         A reset that was given before is withdrawn there.
         """
         self._in_production = production
-        self._reset_given = self._reset_given and production
+        if not production:
+            self.withdraw_reset()
 
     @contextlib.contextmanager
     def manual(self, activity: Message, end: Callable[[], Awaitable[None]]) -> Iterator[None]:

@@ -26,7 +26,7 @@ from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import ARM, DeviceManager
 from station.runtime.observability.audit_logger import AuditLogger
 from station.runtime.production.lots import LotManager, is_lot_name
-from station.runtime.production.plc_commands import PlcCommands
+from station.runtime.production.plc_commands import MANUAL, PlcCommands
 from station.vocabulary import LONGEST_LOT
 
 AT_ONCE_S = 0.4
@@ -160,7 +160,15 @@ class OperatorCommands:
             if argument and not (argument.isascii() and argument.isdigit() and int(argument) <= 65_535):
                 return messages.NO_NUMBER(command=order, argument=argument)
             command = Command(command=_COMMANDS[order], argument=int(argument or 0))
-            return (await self._plc_commands.execute(command, by)).why
+            why = None
+            if command.command is CommandName.SET_MODE and command.argument == MANUAL != self._plc_commands.mode:
+                # The person may reach into the cell next: no mode that the PLC sets may end that.
+                why = await self._plc_commands.stop()
+                self._audit.log_command(by, OperatorCommandName.STOP, "", why)
+                if not self._service.stopped_by_person:
+                    self._audit.log_command(by, order, argument, why := messages.STARTED_MEANWHILE())
+                    return why
+            return (await self._plc_commands.execute(command, by)).why or why
         match order:
             case OperatorCommandName.RECOVER:
                 return await self._recover(argument, by)

@@ -163,7 +163,17 @@ class PlcCommands:
         self._storing_mode = asyncio.create_task(self._store_mode())
         if not self._service.makes_itself_ready:
             await self._devices.end_recovery()
+        if mode != PRODUCTION:
+            await self._end_homing()
         return None if await asyncio.shield(self._storing_mode) else messages.MODE_NOT_STORED(mode=mode)
+
+    async def _end_homing(self) -> None:
+        """Stop jaws and arm where the station makes itself ready; what follows a fruit comes to its end."""
+        runner = self._service.runner
+        await runner.taken()  # a reset by the station itself may be on its way
+        if runner.state in {State.RESETTING, State.HOMING}:
+            runner.post(Event.STOP)
+            await runner.taken()  # with its HALT
 
     async def _store_mode(self) -> bool:
         """Make the mode durable; the last order's is what the file has at the end."""
@@ -277,10 +287,25 @@ class PlcCommands:
         return self.reset_refusal() or await self._make_ready(ordered_s, program_stopped=program_stopped)
 
     async def _make_ready(self, ordered_s: float, *, program_stopped: bool) -> Message | None:
-        """Make the station ready from the state that it is in by now; the arguments are those of `_later_stop`."""
-        service, state = self._service, self._service.state
-        service.request_reset()
+        """Make the station ready from the state that it is in by now; the arguments are those of `_later_stop`.
+
+        A reset that fails stays in force in production mode alone: in another one, people may reach into the cell when
+        the device that it waited for returns.
+        """
+        self._service.request_reset()
         self._devices.confirm_clear()
+        ready = False
+        try:
+            why_not = await self._lead_to_ready(ordered_s, program_stopped=program_stopped)
+            ready = why_not is None
+        finally:
+            if not ready and self.mode != PRODUCTION:
+                self._service.withdraw_reset()
+                await self._devices.end_recovery()
+        return why_not
+
+    async def _lead_to_ready(self, ordered_s: float, *, program_stopped: bool) -> Message | None:
+        service, state = self._service, self._service.state
         if state not in {State.LATCHED, State.STOPPED}:
             try:
                 await self._devices.restart_program()

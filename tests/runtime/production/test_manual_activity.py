@@ -12,13 +12,14 @@ from station.devices.gripper.errors import GripperStoppedError
 from station.errors import StationError
 from station.inspection.states import State
 from station.messages.calibration import A_CALIBRATION, STEP_PRESS
-from station.messages.commands import JOGGING
-from station.messages.gripper import REMEDY_STOPPED, STOPPED
+from station.messages.commands import JOGGING, TOO_SLOW
+from station.messages.gripper import JAWS_UNKNOWN, REMEDY_STOPPED, STOPPED
 from station.messages.maintenance import UNDER_WAY
 from station.press.reference import are_open
 from station.runtime.devices.calibration_rig import CalibrationRig
 from station.runtime.devices.manager import CAMERA, GRIPPER, DeviceManager
-from station.runtime.production.plc_commands import MANUAL
+from station.runtime.production import plc_commands
+from station.runtime.production.plc_commands import MANUAL, PRODUCTION
 from station.state_files import StateFiles
 from tests.runtime.ball import MAX, end_run, give, run_now, start_run, stop, until_waits
 
@@ -100,6 +101,55 @@ def test_in_manual_mode_a_reset_waits_for_a_lost_device_and_the_mode_takes_it_ba
             assert service.makes_itself_ready
             assert (await cell.line.order(CommandName.SET_MODE, MANUAL)).done
             assert not service.makes_itself_ready
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_a_reset_that_failed_in_manual_mode_moves_nothing_once_the_device_is_back(at_ball, monkeypatch):
+    async def scenario():
+        async with at_ball() as (cell, _, entered):
+            camera, gripper = cell.twin.boards["camera"], cell.twin.boards["gripper"]
+
+            def faults():
+                return cell.station.service._devices.faults
+
+            async def fails():
+                with monkeypatch.context() as impatient:
+                    impatient.setattr(plc_commands, "DEADLINE_S", 0.5)
+                    return (await cell.line.order(CommandName.RESET)).why.id == TOO_SLOW.id
+
+            camera.set("off")
+            await cell.until(lambda: cell.phase is State.HELD)
+            assert await fails()
+            camera.clear()
+            await cell.until(lambda: State.STOPPED in entered)
+            await cell.station.service.runner.taken()
+            assert entered[-1] is State.STOPPED
+            assert (await cell.line.order(CommandName.RESET)).done
+
+            camera.set("off")
+            gripper.set("power_cut")
+            gripper.clear()
+            await cell.until(lambda: set(faults()) == {CAMERA, GRIPPER})
+            assert await fails()
+            camera.clear()
+            assert (await cell.line.order(CommandName.SET_MODE, PRODUCTION)).done
+            # The confirmation of the jaws has ended with the reset: no activation closes them.
+            await cell.until(lambda: GRIPPER in faults() and faults()[GRIPPER].cause == JAWS_UNKNOWN())
+            assert (await cell.line.order(CommandName.RESET)).done
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_manual_mode_that_is_ordered_again_at_the_panel_ends_no_run(at_ball):
+    async def scenario():
+        async with at_ball() as (_, panel, _):
+            await start_run(panel)
+            assert (await give(panel, OperatorCommandName.SET_MODE, str(MANUAL))).state == "done"
+            assert (await run_now(panel)).state in {"running", "waiting"}
+            await end_run(panel)
 
     asyncio.run(scenario())
 

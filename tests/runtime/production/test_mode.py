@@ -7,15 +7,20 @@ from typing import Any
 
 import pytest
 
+from station.channel.client import ChannelClient
 from station.channel.line import CommandName
+from station.channel.panel_run import OperatorCommandName
 from station.inspection.states import State
-from station.messages import commands
+from station.messages import commands, readiness
 from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import GRIPPER
 from station.runtime.production import plc_commands
 from station.runtime.production.housekeeping import Housekeeping
 from station.runtime.production.plc_commands import MANUAL, PRODUCTION, PlcCommands
+from station.settings.hmi import panel_endpoint
 from station.state_files import StateFiles
+from station.vocabulary import Refusal
+from tests.runtime.ball import give
 
 
 @pytest.fixture
@@ -75,6 +80,82 @@ def test_a_mode_that_nobody_can_read_is_manual(bench, settings_file, tmp_path, s
     async def scenario():
         async with bench(file) as cell:
             assert (await cell.line.state()).mode == mode
+
+    asyncio.run(scenario())
+
+
+def panel_of(cell):
+    """Connect to the station as the pages do."""
+    return ChannelClient(panel_endpoint(cell.configuration.hmi, cell.configuration.home), "the station")
+
+
+@pytest.mark.timeout(240)
+def test_manual_mode_by_a_person_stops_the_station_until_a_persons_start_whatever_mode_the_plc_sets(bench):
+    async def scenario():
+        async with bench() as cell, panel_of(cell) as panel:
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            manual = await give(panel, OperatorCommandName.SET_MODE, str(MANUAL))
+            assert (manual.state, cell.phase) == ("done", State.STOPPED)
+            assert (await cell.line.state()).mode == MANUAL
+            assert (await cell.line.order(CommandName.SET_MODE, PRODUCTION)).done
+            assert (await cell.line.begin()).refusal is Refusal.NOT_READY
+            reset = await cell.line.order(CommandName.RESET)
+            assert (reset.done, reset.why) == (False, readiness.STOPPED_BY_PERSON())
+            assert (cell.configuration.home / "stopped_by_a_person").read_text() == "yes"
+            assert (await give(panel, OperatorCommandName.START)).state == "done"
+            assert (await cell.line.ready()).mode == PRODUCTION
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_manual_mode_that_still_waits_for_the_arm_is_not_set_after_a_persons_start(bench):
+    async def scenario():
+        async with bench(bench=False) as cell, panel_of(cell) as panel:
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            cell.at(State.RETREATING_READY, lambda: cell.twin.boards["arm"].set("slow", 100.0))
+            await cell.line.begin()
+            await cell.reach(State.RETREATING_READY)
+            manual = asyncio.create_task(give(panel, OperatorCommandName.SET_MODE, str(MANUAL)))
+            await cell.until(lambda: cell.station.service.stopped_by_person)
+            assert (await give(panel, OperatorCommandName.START)).state == "done"
+            assert (await manual).why == commands.STARTED_MEANWHILE()
+            cell.twin.boards["arm"].clear()
+            assert (await cell.line.ready()).mode == PRODUCTION
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize("mode", [2, MANUAL])
+def test_another_mode_is_set_once_an_arm_that_went_home_by_itself_is_at_rest(bench, mode):
+    async def scenario():
+        async with bench(bench=False) as cell:
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            await cell.line.begin()
+            await cell.reach(State.CLOSING_TO_ONSET)
+            cell.twin.boards["arm"].set("link_cut")
+            await cell.reach(State.HELD)
+            cell.twin.boards["arm"].set("slow", 100.0)
+            cell.twin.boards["arm"].clear("link_cut")
+            await cell.reach(State.HOMING)
+            arm = cell.station.service._devices.cell.arm
+
+            async def moving():
+                return (await arm.state()).moving
+
+            await cell.until(moving)
+            done = await cell.line.order(CommandName.SET_MODE, mode)
+            assert done.done, done.why
+            assert (cell.phase, await moving()) == (State.STOPPED, False)
+            assert (await arm.state()).at not in {"above_nest", "home"}
+            cell.twin.boards["arm"].clear()
+            assert (await cell.line.order(CommandName.SET_MODE, PRODUCTION)).done
+            assert (await cell.line.order(CommandName.RESET)).done
+            await cell.line.ready()
 
     asyncio.run(scenario())
 
