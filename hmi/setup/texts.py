@@ -52,7 +52,7 @@ define(
 )
 define("setup.reference_stored", "An image of the untouched gel is stored.")
 define("setup.how.recipe", "Choose the fruit. Recipes that are not approved are on the page Recipes.")
-define("setup.how.first", "Set production mode, put a fruit into the nest, and let the PLC trigger.")
+define("setup.how.first", "Set production mode, start the station, put a fruit into the nest, and let the PLC trigger.")
 define("setup.first_fruit", "Fruit {n}")
 define("setup.taught", "The poses are the site's own.")
 define("setup.taught_simulated", "The arm is simulated: the default poses are right.")

@@ -11,6 +11,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 
+from station.messages.readiness import STOPPED_BY_PERSON
 from station.records.audit_report import read_audit
 from station.records.database import reading
 from tests.chromium import follow
@@ -34,6 +35,13 @@ def holding(page: Page, address: str) -> list[Any]:
 
     page.route(address, hold)
     return held
+
+
+def start(person: Any, site: Any, eventually: Callable[..., Any]) -> None:
+    """*Start*, which alone ends the stop of manual mode that was set at the panel."""
+    assert site.state().why_not_ready == STOPPED_BY_PERSON()
+    follow(person.go("/").get_by_role("button", name="Start", exact=True))
+    eventually(site.ready)
 
 
 def test_jogging_is_refused_out_of_manual_mode_and_done_in_it(
@@ -70,6 +78,7 @@ def test_jogging_is_refused_out_of_manual_mode_and_done_in_it(
     follow(page.get_by_role("button", name="Back to production"))
     expect(page.get_by_role("button", name="Set manual mode")).to_be_visible()
     assert orchard.state().mode == 1
+    start(person, orchard, eventually)
 
 
 def test_the_live_image_goes_on_and_registers_are_told_by_name(orchard: Any, panel: Any) -> None:
@@ -133,13 +142,15 @@ def test_a_verification_without_a_calibration_says_what_to_do(orchard: Any, pane
         assert page.get_by_text("None yet.").count() == 2
 
 
-def test_the_mode_is_set_on_the_tab_of_the_ball_too(orchard: Any, panel: Any) -> None:
-    page = panel("Max").go("/maintenance/sensor")
+def test_the_mode_is_set_on_the_tab_of_the_ball_too(orchard: Any, panel: Any, eventually: Callable[..., Any]) -> None:
+    person = panel("Max")
+    page = person.go("/maintenance/sensor")
     follow(page.get_by_role("button", name="Set manual mode"))
     expect(page.get_by_role("button", name="Calibrate")).to_be_visible()
     follow(page.get_by_role("button", name="Back to production"))
     expect(page.get_by_text("set manual mode, 3, first")).to_be_visible()
     assert orchard.state().mode == 1
+    start(person, orchard, eventually)
 
 
 def test_places_are_typed_at_a_panel_one_per_line(orchard: Any, panel: Any) -> None:
