@@ -20,7 +20,7 @@ LAST_BACKUP = "last_backup"
 _OF_THE_CELL = frozenset({"held_for_a_person", "stopped_by_a_person", "mode", "plc", "active_recipe.json", "named_lot"})
 """Whether a fruit is held, a person has stopped the station or works in the cell, what is open with the PLC, and which
 recipe and lot run."""
-LEFT_OUT = frozenset({"records", "run", "panel_jobs", "logs", LAST_BACKUP}) | _OF_THE_CELL
+LEFT_OUT = frozenset({"records", "run", "panel_jobs", "logs", "lost+found", LAST_BACKUP}) | _OF_THE_CELL
 """Of the home folder: the records are copied by the station itself, the rest is of the moment.
 
 A restore must not replace what is so now in the cell by what was so when the backup was made.
@@ -106,8 +106,12 @@ def prune(layout: Layout, kind: str, keep: int, made: Path) -> None:
         others = [path for path in layout.backups.glob(f"{kind}*") if path.is_dir() and path != made]
         others.sort(key=lambda path: ((number := _sequence(path)) <= last, number, path.name))
         for path in others[: max(0, len(others) + 1 - keep)]:
-            shutil.rmtree(path)
-            print_progress(f"removed {path}, which was older than the last {keep}")
+            try:
+                shutil.rmtree(path)
+            except OSError as error:  # the new backup is complete all the same
+                print_progress(f"{path} cannot be removed ({error.strerror}): remove it as root")
+            else:
+                print_progress(f"removed {path}, which was older than the last {keep}")
 
 
 @contextlib.contextmanager

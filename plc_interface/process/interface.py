@@ -75,10 +75,10 @@ class Interface:
         if "control" in known:
             known["control"] = _CONTROL.names(known["control"])
         self._inputs = replace(self._inputs, **known)
-        count = self._output.encoder_count()
-        inputs = self._inputs if count is None else replace(self._inputs, encoder=count)
         # Before the write: a trigger in it is accepted only if its fruit can be diverted now.
         self._report_output()
+        count = self._output.encoder_count()  # after that, as the output is ready by its first count
+        inputs = self._inputs if count is None else replace(self._inputs, encoder=count)
         self.feed(ev.PlcWrote(now(), inputs, frozenset(known)))
 
     def on_writer(self, peer: Peer | None, change: WriterChange) -> None:

@@ -100,7 +100,8 @@ class CalibrationStore:
                 # Files made within one tick of the kernel's clock leave the folder the same time, and who watches it
                 # may have read it between two of them: a time of another clock is seen as a change for certain.
                 now_ns = time.time_ns()
-                os.utime(folder, ns=(now_ns, now_ns))
+                with contextlib.suppress(PermissionError):  # another user's folder: the marks have changed its time
+                    os.utime(folder, ns=(now_ns, now_ns))
         except OSError as error:
             raise _not_stored(folder, error) from error
 

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import os
 import sys
+import termios
 from collections.abc import AsyncIterator
 
 import click
@@ -85,6 +86,8 @@ async def open_rig(
 
 async def wait_for_enter(request: str) -> None:
     """Wait for a person's Enter; Ctrl-C ends the wait, and the end of the input cancels the run."""
+    if sys.stdin.isatty():
+        termios.tcflush(sys.stdin, termios.TCIFLUSH)  # an Enter from before the request is no answer to it
     click.echo(request)
     loop, line = asyncio.get_running_loop(), asyncio.Event()
     try:

@@ -156,6 +156,27 @@ def test_a_link_that_the_stations_user_put_there_is_not_followed(root, installed
     programs.own(installer("layout").Layout(Path("/")), link, user, group)
 
 
+def test_an_old_backup_that_only_root_may_remove_stops_no_new_one(root, installed, installer, monkeypatch, capsys):
+    (installed.home / "lost+found").mkdir()
+    for day in (1, 2, 3):
+        made_before(installed, f"daily-2026010{day}T000000Z", day)
+    remove = shutil.rmtree
+
+    def rmtree(path, **options):
+        if path.name == "daily-20260101T000000Z":
+            raise PermissionError(13, "Permission denied", str(path))
+        remove(path, **options)
+
+    monkeypatch.setattr(shutil, "rmtree", rmtree)
+    monkeypatch.setattr(sys, "argv", ["backup", "--root", str(installed.root), "--keep", "2"])
+    assert runpy.run_path(str(root / "deploy/backup"))["main"]() == 0
+    assert "daily-20260101T000000Z cannot be removed (Permission denied): remove it as root" in capsys.readouterr().out
+    old, last, made = sorted(installed.backups.iterdir())
+    assert (old.name, last.name) == ("daily-20260101T000000Z", "daily-20260103T000000Z")
+    assert (made / "settings/station.yaml").exists()
+    assert not (made / "state/lost+found").exists(), "which only root may read where the home is a disk of its own"
+
+
 def test_root_backs_up_as_the_stations_user(root, installer, installed, monkeypatch, capsys):
     """In the user's folders root would follow links to any file; the upgrade calls the same program."""
     done, programs = [], installer("programs")

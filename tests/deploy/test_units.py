@@ -86,7 +86,9 @@ def test_a_unit_makes_itself_what_it_may_write(root, name):
     made = (root / "deploy/tmpfiles.d/fruit-station.conf").read_text()
     for path in " ".join(service.get("ReadWritePaths", [])).split():
         assert f"\nd {path} " in made
-        assert "+/usr/bin/systemd-tmpfiles --create fruit-station.conf" in service["ExecStartPre"]
+        # Only this folder: a site may have given another one other rights.
+        makes = f"-+/usr/bin/systemd-tmpfiles --create --prefix={path} fruit-station.conf"
+        assert makes in service["ExecStartPre"]
 
 
 def test_the_units_times_leave_room_for_what_the_supervisor_mends_itself(root):
@@ -189,6 +191,12 @@ def test_users_and_folders_are_made(tmp_path, root):
     }
     assert {name: oct(found.st_mode & 0o777) for name, found in folders.items()} == dict.fromkeys(folders, "0o750")
     assert [found.st_uid for found in folders.values()] == [0, uid, uid]
+    (tmp_path / "etc/fruit-station").chmod(0o770)  # as the page Configuration needs it
+    (tmp_path / "var/backups/fruit-station").rmdir()
+    options = [f"--root={tmp_path}", "--create", "--prefix=/var/backups/fruit-station"]
+    subprocess.run([optional("systemd-tmpfiles"), *options, "fruit-station.conf"], check=True)
+    assert (tmp_path / "var/backups/fruit-station").stat().st_uid == uid
+    assert (tmp_path / "etc/fruit-station").stat().st_mode & 0o777 == 0o770
 
 
 def rule_lines(root: Path) -> list[str]:

@@ -280,12 +280,16 @@ class DeviceManager:
                 raise
             self._not_activated = None
 
+    def withdraw_confirmation(self) -> None:
+        """Have the jaws confirmed anew before the next activation."""
+        self._confirmed_clear = False
+
     async def end_recovery(self) -> None:
         """Stop the restoring of a lost activation, and wait for its end; a later one needs the jaws confirmed anew.
 
         Fingers that travel already come to their end, which nothing but their power prevents.
         """
-        self._confirmed_clear = False
+        self.withdraw_confirmation()
         if self._recovery.locked():
             await self.halt()
             async with self._recovery:

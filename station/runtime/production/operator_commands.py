@@ -161,7 +161,8 @@ class OperatorCommands:
                 return messages.NO_NUMBER(command=order, argument=argument)
             command = Command(command=_COMMANDS[order], argument=int(argument or 0))
             why = None
-            if command.command is CommandName.SET_MODE and command.argument == MANUAL != self._plc_commands.mode:
+            manual = command.command is CommandName.SET_MODE and command.argument == MANUAL
+            if manual and (self._plc_commands.mode != MANUAL or self._service.manual_activity is None):
                 # The person may reach into the cell next: no mode that the PLC sets may end that.
                 why = await self._plc_commands.stop()
                 self._audit.log_command(by, OperatorCommandName.STOP, "", why)

@@ -161,10 +161,11 @@ class PlcCommands:
         self._service.set_mode(production=mode == PRODUCTION)
         # A write that outlasts its order is not left behind, or it could replace the next order's.
         self._storing_mode = asyncio.create_task(self._store_mode())
-        if not self._service.makes_itself_ready:
-            await self._devices.end_recovery()
-        if mode != PRODUCTION:
-            await self._end_homing()
+        if self._service.manual_activity is None:  # its motion is its own, where the present mode is set again
+            if not self._service.makes_itself_ready:
+                await self._devices.end_recovery()
+            if mode != PRODUCTION:
+                await self._end_homing()
         return None if await asyncio.shield(self._storing_mode) else messages.MODE_NOT_STORED(mode=mode)
 
     async def _end_homing(self) -> None:
@@ -301,7 +302,10 @@ class PlcCommands:
         finally:
             if not ready and self.mode != PRODUCTION:
                 self._service.withdraw_reset()
-                await self._devices.end_recovery()
+                self._devices.withdraw_confirmation()
+                if self._service.manual_activity is None:
+                    await self._devices.end_recovery()
+                    await self._end_homing()
         return why_not
 
     async def _lead_to_ready(self, ordered_s: float, *, program_stopped: bool) -> Message | None:

@@ -77,8 +77,6 @@ def test_registers_that_stay_held_after_a_cut_are_another_clients(healthy_arm, u
 
 def test_a_request_to_the_dashboard_server_that_was_given_up_is_not_sent_on(host, monkeypatch):
     """A reset in place of an end: with it the kernel discards what it would send where a cut network comes back."""
-    monkeypatch.setattr(dashboard, "LINE_DEADLINE_S", 0.1)
-
     async def run():
         ends: asyncio.Future[BaseException | bytes] = asyncio.get_running_loop().create_future()
 
@@ -91,6 +89,7 @@ def test_a_request_to_the_dashboard_server_that_was_given_up_is_not_sent_on(host
         async with await asyncio.start_server(mute, host, dashboard.PORT):
             with pytest.raises(ArmFault):
                 async with dashboard.dashboard(host) as conversation:
+                    monkeypatch.setattr(dashboard, "LINE_DEADLINE_S", 0.1)  # of this answer alone
                     await conversation.request("brake release")
             assert isinstance(await ends, ConnectionResetError)
 

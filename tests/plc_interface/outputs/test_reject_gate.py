@@ -193,7 +193,8 @@ def test_a_run_of_rejects_longer_than_the_gates_places_is_diverted_as_places_bec
         assert rig.gate.faults == ()
         assert rig.gate.counters["can_shots_ordered"] == rig.gate.counters["can_shots_fired"] == last
 
-    gated(scenario, distance_counts=10_000)
+    # A machine that stalls for a second must not lose a node, whose orders would come again.
+    gated(scenario, distance_counts=10_000, heartbeat_lost_s=10.0, count_stale_s=5.0, echo_deadline_s=5.0)
 
 
 def test_an_order_that_a_full_gate_refuses_is_repeated_until_a_place_is_free(gated, monkeypatch):

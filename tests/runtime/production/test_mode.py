@@ -12,6 +12,7 @@ from station.channel.line import CommandName
 from station.channel.panel_run import OperatorCommandName
 from station.inspection.states import State
 from station.messages import commands, readiness
+from station.messages.calibration import A_CALIBRATION
 from station.runtime.cycle.service import Service
 from station.runtime.devices.manager import GRIPPER
 from station.runtime.production import plc_commands
@@ -158,6 +159,72 @@ def test_another_mode_is_set_once_an_arm_that_went_home_by_itself_is_at_rest(ben
             await cell.line.ready()
 
     asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_manual_mode_that_the_plc_has_set_is_a_stop_for_the_person_who_orders_it_too(bench):
+    async def scenario():
+        async with bench() as cell, panel_of(cell) as panel:
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            assert (await cell.line.order(CommandName.SET_MODE, MANUAL)).done
+            manual = await give(panel, OperatorCommandName.SET_MODE, str(MANUAL))
+            assert (manual.state, cell.phase) == ("done", State.STOPPED)
+            assert (await cell.line.order(CommandName.SET_MODE, PRODUCTION)).done
+            assert (await cell.line.begin()).refusal is Refusal.NOT_READY
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.timeout(240)
+def test_a_reset_in_manual_mode_that_is_not_done_in_time_leaves_the_arm_at_rest(bench, monkeypatch):
+    async def scenario():
+        async with bench(bench=False) as cell:
+            await cell.choose("blueberry")
+            await cell.line.ready()
+            await cell.line.begin()
+            await cell.reach(State.CLOSING_TO_ONSET)
+            cell.twin.boards["arm"].set("link_cut")
+            await cell.reach(State.HELD)
+            assert (await cell.line.order(CommandName.SET_MODE, MANUAL)).done
+            cell.twin.boards["arm"].set("slow", 100.0)
+            cell.twin.boards["arm"].clear("link_cut")
+            await cell.reach(State.STOPPED)
+            monkeypatch.setattr(plc_commands, "DEADLINE_S", 5.0)
+            done = await cell.line.order(CommandName.RESET)
+            assert (done.done, done.why and done.why.id) == (False, commands.TOO_SLOW.id)
+            arm = cell.station.service._devices.cell.arm
+            assert (cell.phase, (await arm.state()).moving) == (State.STOPPED, False)
+            cell.twin.boards["arm"].clear()
+
+    asyncio.run(scenario())
+
+
+def test_the_mode_that_is_set_already_ends_no_activation_of_a_manual_activity(tmp_path):
+    """Its own activation has the lock of a recovery, which would be stopped."""
+    ended = list[str]()
+
+    async def end_recovery():
+        ended.append("recovery")
+
+    async def noted():
+        return True
+
+    service: Any = SimpleNamespace(
+        manual_activity=A_CALIBRATION(),
+        makes_itself_ready=False,
+        set_mode=lambda **_: None,
+        state=State.STOPPED,
+    )
+    devices: Any = SimpleNamespace(end_recovery=end_recovery, light_by_hand=False)
+    none: Any = None
+    orders = PlcCommands(service, devices, none, none, StateFiles(tmp_path), none)
+    orders.mode, orders._store_mode = MANUAL, noted
+    assert asyncio.run(orders._set_mode(MANUAL)) is None
+    assert not ended
+    service.manual_activity = None
+    assert asyncio.run(orders._set_mode(PRODUCTION)) is None
+    assert ended == ["recovery"]
 
 
 @pytest.mark.timeout(240)
