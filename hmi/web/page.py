@@ -43,7 +43,8 @@ def show(request: Request, template: str, *, status: int = 200, **values: Any) -
     }
     answer = HTMLResponse(hmi.renderer.render(template, locale, {**frame, **values}), status)
     give_session(request, answer, getattr(request.state, "new_session", ""))
-    if caller.name and request.method == "GET":
+    # The answer to a page's own poll is a page only where it failed: that is nobody's touch.
+    if caller.name and request.method == "GET" and status < 400:
         hmi.sessions.touch(caller.session)
     return answer
 

@@ -414,6 +414,15 @@ class TestSessions:
         assert [caller.name for caller in sessions.sweep()] == ["Ana"]
         assert sessions.sweep() == []
 
+    def test_a_page_whose_polls_fail_keeps_nobody_logged_in(self, pages, monkeypatch):
+        clock, sessions = Clock(), pages.context.sessions
+        monkeypatch.setattr(sessions, "_clock", clock)
+        session = log_in(pages, "Ana", Role.OPERATOR)
+        for _ in range(3):
+            clock.now_s += 0.4 * pages.context.settings.idle_s
+            assert pages("GET", "/alarms/camera_lost/part")[0] == 503
+        assert sessions.caller(session).role is Role.VIEWER
+
     def test_an_old_token_is_refused(self):
         clock = Clock()
         sessions = Sessions(60.0, clock)
