@@ -5,6 +5,7 @@ import contextlib
 import logging
 import uuid
 from collections.abc import AsyncIterator
+from http import HTTPStatus
 from pathlib import Path
 
 from fastapi import Depends, FastAPI, Request
@@ -41,6 +42,8 @@ from station.settings.configuration import Configuration
 from station.settings.hmi import panel_endpoint
 
 _SWEEP_S = 1.0
+_UNKNOWN_PATH = frozenset({HTTPStatus.NOT_FOUND.phrase, HTTPStatus.METHOD_NOT_ALLOWED.phrase})
+"""The framework's own details, in place of which our words are shown; the API's details are sentences."""
 
 log = logging.getLogger(__name__)
 
@@ -136,8 +139,8 @@ async def _problem(request: Request, error: Problem) -> Response:
 
 
 async def _http(request: Request, error: HTTPException) -> Response:
-    key = {404: "problem.not_found", 405: "problem.not_found"}.get(error.status_code)
-    answer = _problem_answer(request, error.status_code, locale_of(request).text(key) if key else error.detail)
+    text = locale_of(request).text("problem.not_found") if error.detail in _UNKNOWN_PATH else error.detail
+    answer = _problem_answer(request, error.status_code, text)
     answer.headers.update(error.headers or {})
     if error.status_code == 405:
         answer.headers["allow"] = ", ".join(sorted(_methods(request)))

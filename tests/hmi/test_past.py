@@ -187,7 +187,10 @@ def test_a_fruit_that_there_is_not_is_said(pages, fruit):
         log_in(pages, "Ana", Role.ADMIN)
         status, _, body = pages("GET", f"/history/{fruit + 1}")
         assert (status, b"no inspection" in body.lower()) == (409, True)
-        assert pages("GET", f"/api/v1/inspections/{fruit + 1}")[0] == 404
+        status, _, body = pages("GET", f"/api/v1/inspections/{fruit + 1}")
+        assert (status, f"no inspection {fruit + 1}" in json.loads(body)["detail"].lower()) == (404, True)
+        assert "there is no lot NO" in json.loads(pages("GET", "/api/v1/lots/NO")[2])["detail"]
+        assert json.loads(pages("GET", "/api/v1/nothing")[2])["detail"] == "This page does not exist."
 
 
 def test_without_records_the_page_says_so(pages):

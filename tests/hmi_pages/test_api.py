@@ -163,7 +163,8 @@ def test_a_withdrawn_token_counts_no_more(site: Any, api: Any, token_of: Any) ->
 
 def test_a_readers_token_changes_nothing(api: Any, reading: str) -> None:
     assert api("PUT", "/api/v1/lots/NO", token=reading, json_body={"grower": "x"}).status == 403
-    assert api("GET", "/api/v1/lots/NO", token=reading).status == 404
+    unknown = api("GET", "/api/v1/lots/NO", token=reading)
+    assert (unknown.status, unknown.body["detail"].partition(";")[0]) == (404, "there is no lot NO")
 
 
 def test_a_number_that_json_has_not_is_an_invalid_value(api: Any, writing: str) -> None:
