@@ -15,7 +15,7 @@ from hmi.past.past import RecordsError, Tried
 from hmi.past.recipes import PastCurve, RecipeState, changes_of, recipe_of
 from hmi.recipes.form import BadFieldError, changed, formatted, groups, with_changes
 from hmi.recipes.strip import strip
-from hmi.web.access import HmiNow, LocaleNow, caller_of, orders
+from hmi.web.access import HmiNow, LocaleNow, caller_of, hmi_of, locale_of, orders
 from hmi.web.context import Hmi
 from hmi.web.gateway import SLOW_DEADLINE_S, actor_of
 from hmi.web.navigation import Entry
@@ -25,7 +25,7 @@ from hmi.web.roles import Right
 from hmi.web.sessions import Caller
 from hmi.web.translation import Locale
 from station.channel.line import Noted
-from station.channel.messages import RefusedError
+from station.channel.messages import DeadlineError, RefusedError
 from station.channel.panel_recipes import (
     LARGEST_TEXT,
     ApproveRecipe,
@@ -39,7 +39,6 @@ from station.channel.panel_recipes import (
 )
 from station.charts.area_chart import Curve, Kind, Limit
 from station.errors import BadInputError
-from station.messages.message import Message
 from station.settings.recipe_model import Recipe
 from station.settings.recipe_versions import content_sha256
 
@@ -67,6 +66,12 @@ async def recipes(request: Request, hmi: HmiNow) -> Response:
 @router.get("/{name}")
 async def recipe(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -> Response:
     """Show one recipe: the revision in force, the draft, the differences, the possible actions."""
+    return await _recipe(request, hmi, locale, name)
+
+
+async def _recipe(
+    request: Request, hmi: Hmi, locale: Locale, name: str, unanswered: RecipeOrder | None = None
+) -> Response:
     state = await _state(hmi, name)
     shown, problem = state.control.recipe if state.control else None, None
     if state.submitted:
@@ -77,7 +82,20 @@ async def recipe(request: Request, hmi: HmiNow, locale: LocaleNow, name: Name) -
     new = shown if state.submitted else state.file.recipe if state.file else None
     changes = changes_of(state.control.recipe, new) if state.control and new else ()
     drawn = None if shown is None else await _drawn(hmi, locale, shown, shown.model_dump(mode="json"))
-    return show(request, "recipe.html.j2", row=state, changes=changes, problem=problem, drawn=drawn, tab="standing")
+    # Carried out after all, an order leaves the page with another form, whose reason is another.
+    same_form = isinstance(unanswered, ApproveRecipe | RejectRecipe) == bool(state.submitted)
+    return show(
+        request,
+        "recipe.html.j2",
+        status=503 if unanswered else 200,
+        row=state,
+        changes=changes,
+        problem=problem,
+        drawn=drawn,
+        wrong=locale.text("problem.no_answer") if unanswered else "",
+        reason=unanswered.reason if unanswered and same_form else "",
+        tab="standing",
+    )
 
 
 @router.get("/{name}/edit")
@@ -119,42 +137,44 @@ async def save(
         query = SaveDraft(name=name, values=changes, base=base, reason=reason, actor=actor_of(caller))
         await hmi.gateway.request(query, Noted, deadline_s=SLOW_DEADLINE_S)
     except RefusedError as error:
-        return await _form(request, hmi, locale, name, typed, base, error.message, reason)
+        return await _form(request, hmi, locale, name, typed, base, locale.sentence(error.message), reason)
+    except DeadlineError:
+        return await _form(request, hmi, locale, name, typed, base, locale.text("problem.no_answer"), reason, 503)
     return go_to(f"/recipes/{name}")
 
 
 @router.post("/{name}/submit")
-async def submit(hmi: HmiNow, name: Name, caller: Editor, reason: Reason) -> Response:
+async def submit(request: Request, name: Name, caller: Editor, reason: Reason) -> Response:
     """Record the edited file as a draft."""
-    return await _order(hmi, SubmitRecipe(name=name, reason=reason, actor=actor_of(caller)))
+    return await _order(request, SubmitRecipe(name=name, reason=reason, actor=actor_of(caller)))
 
 
 @router.post("/{name}/approve")
 async def approve(
-    hmi: HmiNow, name: Name, caller: Approver, reason: Reason, revision: Annotated[int, Form(ge=1, le=2**31)]
+    request: Request, name: Name, caller: Approver, reason: Reason, revision: Annotated[int, Form(ge=1, le=2**31)]
 ) -> Response:
     """Approve a draft."""
-    return await _order(hmi, ApproveRecipe(name=name, revision=revision, reason=reason, actor=actor_of(caller)))
+    return await _order(request, ApproveRecipe(name=name, revision=revision, reason=reason, actor=actor_of(caller)))
 
 
 @router.post("/{name}/reject")
 async def reject(
-    hmi: HmiNow, name: Name, caller: Approver, reason: Reason, revision: Annotated[int, Form(ge=1, le=2**31)]
+    request: Request, name: Name, caller: Approver, reason: Reason, revision: Annotated[int, Form(ge=1, le=2**31)]
 ) -> Response:
     """Reject a draft."""
-    return await _order(hmi, RejectRecipe(name=name, revision=revision, reason=reason, actor=actor_of(caller)))
+    return await _order(request, RejectRecipe(name=name, revision=revision, reason=reason, actor=actor_of(caller)))
 
 
 @router.post("/{name}/revert")
 async def revert(
-    hmi: HmiNow,
+    request: Request,
     name: Name,
     caller: Editor,
     reason: Reason,
     revision: Annotated[int | None, Form(ge=1, le=2**31)] = None,
 ) -> Response:
     """Restore a revision's text in the file."""
-    return await _order(hmi, RevertRecipe(name=name, revision=revision, reason=reason, actor=actor_of(caller)))
+    return await _order(request, RevertRecipe(name=name, revision=revision, reason=reason, actor=actor_of(caller)))
 
 
 @router.get("/{name}/history")
@@ -171,9 +191,25 @@ async def text(
     request: Request, hmi: HmiNow, name: Name, revision: Annotated[int | None, Query(ge=1, le=2**31)] = None
 ) -> Response:
     """Show the file's text, with its comments."""
+    return await _text(request, hmi, name, revision)
+
+
+async def _text(
+    request: Request, hmi: Hmi, name: str, revision: int | None, wrong: str = "", reason: str = ""
+) -> Response:
     row = await _state(hmi, name)
     text = row.valid_file.text if revision is None else (await hmi.past.recipes.revision(name, revision)).text
-    return show(request, "recipe_text.html.j2", row=row, text=text, revision=revision, tab="text")
+    return show(
+        request,
+        "recipe_text.html.j2",
+        status=503 if wrong else 200,
+        row=row,
+        text=text,
+        revision=revision,
+        wrong=wrong,
+        reason=reason,
+        tab="text",
+    )
 
 
 @router.get("/{name}/export")
@@ -209,8 +245,16 @@ async def whatif(hmi: HmiNow, name: Name, last: Annotated[int, Form(ge=1, le=100
     return go_to(f"/jobs/{job.id}?back=/recipes/{name}")
 
 
-async def _order(hmi: Hmi, order: RecipeOrder) -> Response:
-    await hmi.gateway.request(order, Noted, deadline_s=SLOW_DEADLINE_S)
+async def _order(request: Request, order: RecipeOrder) -> Response:
+    """Send an order; without an answer its page is shown again, with the typed reason."""
+    hmi, locale = hmi_of(request), locale_of(request)
+    try:
+        await hmi.gateway.request(order, Noted, deadline_s=SLOW_DEADLINE_S)
+    except DeadlineError:
+        if isinstance(order, RevertRecipe) and order.revision is not None:
+            wrong = locale.text("problem.no_answer")
+            return await _text(request, hmi, order.name, order.revision, wrong, order.reason)
+        return await _recipe(request, hmi, locale, order.name, order)
     return go_to(f"/recipes/{order.name}")
 
 
@@ -221,8 +265,9 @@ async def _form(
     name: str,
     typed: Mapping[str, str],
     base: str = "",
-    wrong: str | Message = "",
+    wrong: str = "",
     reason: str = "",
+    status: int = 400,
 ) -> Response:
     known, row = await hmi.past.recipes.read(), await _state(hmi, name)
     stored = row.valid_file.recipe
@@ -234,7 +279,7 @@ async def _form(
     return show(
         request,
         "recipe_edit.html.j2",
-        status=400 if wrong else 200,
+        status=status if wrong else 200,
         row=row,
         base=base,
         outdated=base != present,

@@ -101,6 +101,32 @@ def test_a_draft_that_this_program_refuses_is_shown_so_that_it_can_be_rejected(p
         assert b"/recipes/raspberry/reject" in body
 
 
+def test_what_was_typed_for_an_order_that_got_no_answer_is_shown_again(pages, tmp_path):
+    RecipeStore(tmp_path, None).begin({})
+    recipe, text = find_recipe("raspberry"), (shipped_folder() / "raspberry.yaml").read_text(encoding="utf-8")
+    with direct_transaction(tmp_path / "records") as connection:
+        submit(connection, text, recipe.model_copy(update={"title": "Another"}), Person("Ida", "quality", "softer"))
+    draft = {"v:damage.area[0].area_mm2": "77,5", "base": "0" * 64}
+    reason = 'name="reason" value="a firmer variety"'
+    with pages.context.past:
+        log_in(pages, "Ana", Role.ADMIN)
+        for path, fields, typed in (
+            ("strawberry/draft", draft, 'value="77,5"'),
+            ("raspberry/approve", {"revision": "2"}, reason),
+            ("raspberry/reject", {"revision": "2"}, reason),
+            ("strawberry/revert", {"revision": "1"}, reason),
+        ):
+            order = {**fields, "reason": "a firmer variety", "csrf": pages.token()}
+            status, _, body = pages.post(f"/recipes/{path}", **order)
+            assert (status, b"The station did not answer in time" in body) == (503, True), path
+            assert typed in body.decode(), path
+        # As the author sends it again, whose first try was carried out after all.
+        order = {"reason": "a firmer variety", "csrf": pages.token()}
+        status, _, body = pages.post("/recipes/raspberry/submit", **order)
+        assert (status, b'action="/recipes/raspberry/approve"' in body) == (503, True)
+        assert b"a firmer variety" not in body
+
+
 def test_recipes_their_history_and_past_curves_are_there_while_the_station_is_away(pages, fruit, tmp_path):
     RecipeStore(tmp_path, None).begin({})
     with pages.context.past:
