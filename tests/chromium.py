@@ -1,4 +1,4 @@
-"""Chromium under test: its arguments, and a wait for the page that a click leads to."""
+"""Chromium under test: its arguments, a finger, and a wait for the page that a click leads to."""
 
 import contextlib
 import time
@@ -48,6 +48,25 @@ def follow(lead: Locator) -> None:
     """Click what leads to another page, and wait until that is loaded, which Playwright's own click does not."""
     with next_document(lead.page):
         lead.click()
+
+
+class Finger:
+    """A finger on a page, whose click is an event after its lifting. However long it stays, that is no long press."""
+
+    def __init__(self, page: Page) -> None:
+        self._session = page.context.new_cdp_session(page)
+
+    def down(self, x: float, y: float) -> None:
+        self._send("touchStart", {"x": x, "y": y})
+
+    def move(self, x: float, y: float) -> None:
+        self._send("touchMove", {"x": x, "y": y})
+
+    def up(self) -> None:
+        self._send("touchEnd")
+
+    def _send(self, kind: str, *points: dict[str, float]) -> None:
+        self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": list(points)})
 
 
 def _until(page: Page, reached: Callable[[float, str], bool]) -> tuple[float, str]:

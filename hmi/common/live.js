@@ -5,6 +5,8 @@
   const STALE_MS = 2000;
   const AGAIN_MS = 1000;
   const SILENT_MS = 5000;
+  // Longest time from a finger's lifting to its click, which is a later event, in ms. An estimate.
+  const CLICK_MS = 300;
   const body = document.body;
   const line = document.querySelector("[data-stale]");
   const parts = new Map([...document.querySelectorAll("[data-live]")].map((part) => [part.dataset.live, part]));
@@ -17,6 +19,7 @@
   const coming = new Map();
   let pressed = null;
   let pressedAt = 0;
+  let lifting = 0;
   let loggedOut = false;
 
   const age = () => (ageThen < 0 ? Infinity : ageThen + performance.now() - heardAt);
@@ -89,21 +92,28 @@
 
   // A key that is held, and a second finger, begin no new time.
   const press = (event) => {
+    clearTimeout(lifting);
     const part = event.target instanceof Element ? event.target.closest("[data-live], [data-poll]") : null;
     if (part !== pressed) {
       pressed = part;
       pressedAt = performance.now();
     }
   };
-  const lift = () =>
-    setTimeout(() => {
-      pressed = null;
-      renew();
-    });
+  const lift = (event) => {
+    const waitsForClick = event.type === "pointerup" && event.pointerType !== "mouse";
+    clearTimeout(lifting);
+    lifting = setTimeout(
+      () => {
+        pressed = null;
+        renew();
+      },
+      waitsForClick ? CLICK_MS : 0,
+    );
+  };
   for (const name of ["pointerdown", "keydown"]) {
     document.addEventListener(name, press);
   }
-  for (const name of ["pointerup", "pointercancel", "keyup"]) {
+  for (const name of ["pointerup", "pointercancel", "keyup", "click"]) {
     document.addEventListener(name, lift);
   }
   window.addEventListener("blur", lift);

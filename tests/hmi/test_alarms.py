@@ -11,7 +11,7 @@ from station.channel.line import CommandDone
 from station.channel.panel import ListedAlarm
 from station.channel.panel_run import PanelState
 from station.inspection.alarm_table import ALARMS, AlarmId
-from tests.chromium import follow
+from tests.chromium import Finger, follow, next_document
 from tests.hmi.test_security import log_in
 from tests.slower_mode import SLOWER_MODE
 
@@ -28,6 +28,39 @@ def become(gateway, since_ms):
         packml_state=None, recipe=None, simulated=False,
     )  # fmt: skip
     gateway.heard_s = time.monotonic()
+
+
+PUSHED = """
+window.EventSource = class extends EventSource {
+  set onmessage(take) {
+    super.onmessage = (event) => {
+      window.push = (parts) => take({data: JSON.stringify({...JSON.parse(event.data), parts})});
+      push({});
+    };
+  }
+};
+"""
+"""Has the test say what changes on a page, beside the station's own events that nothing does."""
+
+
+@pytest.mark.timeout(120)
+def test_what_a_finger_touched_is_what_it_presses_though_another_alarm_came_meanwhile(cell, panel, eventually):
+    def push(path):
+        link = f'<a class="button main" href="{path}">Details</a>'
+        shown.page.evaluate("([path, link]) => push({'alarms.not_normal': [path, link]})", [path, link])
+
+    shown = panel(has_touch=True)
+    shown.page.add_init_script(PUSHED)
+    shown.open("/alarms")
+    eventually(lambda: shown.page.evaluate("'push' in window"))
+    push("/lot")
+    link = shown.page.get_by_role("link", name="Details")
+    box, finger = link.bounding_box(), Finger(shown.page)
+    with next_document(shown.page):
+        finger.down(box["x"] + 30, box["y"] + 30)
+        push("/history")
+        finger.up()
+    assert shown.page.url.endswith("/lot")
 
 
 @pytest.mark.parametrize("path", ["/alarms", "/alarms/camera_lost"])
