@@ -72,7 +72,7 @@
           if (document.querySelector("form[data-sent]")) {
             continue;
           }
-          location.reload();
+          renewal.reload();
           return;
         }
         const top = part.querySelector(".scroll") ? part.querySelector(".scroll").scrollTop : 0;

@@ -27,7 +27,7 @@
   function take(reply) {
     if (loggedOut || reply.boot !== body.dataset.boot || reply.caller !== body.dataset.caller) {
       if (!keepTyped()) {
-        location.reload();
+        reload();
         return;
       }
       loggedOut = true;
@@ -44,6 +44,9 @@
     renew();
     look();
   }
+
+  // The answer to an order is not loaded anew: that would send the order again.
+  const reload = () => ("answer" in body.dataset ? location.replace("/") : location.reload());
 
   // What a person has typed into an order's form outlasts the log-in, to be copied; the form cannot be sent any more.
   // In the answer to an order it is the form's own: a reload would send that again.
@@ -189,10 +192,10 @@
 
   globalThis.staleness = { staleMs: STALE_MS, words: oldWords };
   globalThis.stream = { isHeard: () => !broken && performance.now() - heardAt <= STALE_MS };
-  globalThis.renewal = { fill, isPressed: (part) => part === pressed };
+  globalThis.renewal = { fill, isPressed: (part) => part === pressed, reload };
   document.addEventListener("visibilitychange", () => (document.hidden ? close() : open()));
   window.addEventListener("pagehide", close);
-  window.addEventListener("pageshow", (event) => event.persisted && location.reload());
+  window.addEventListener("pageshow", (event) => event.persisted && reload());
   setInterval(() => {
     look();
     watch();

@@ -30,7 +30,7 @@
         left.textContent = `${seconds} s`;
         if (seconds === 0) {
           lock.close();
-          location.reload();
+          renewal.reload();
           return;
         }
         seconds -= 1;

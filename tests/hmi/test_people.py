@@ -6,7 +6,17 @@ import sys
 
 import pytest
 
-from tests.chromium import follow
+from tests.chromium import follow, next_document
+
+UNKNOWN_ORDER = """() => {
+  const form = Object.assign(document.createElement("form"), {method: "post", action: "/order"});
+  const fields = {csrf: document.body.dataset.token, order: "explode"};
+  form.append(...Object.entries(fields).map(([name, value]) => {
+    return Object.assign(document.createElement("input"), {type: "hidden", name, value});
+  }));
+  document.body.append(form);
+  form.submit();
+}"""
 
 
 @pytest.mark.timeout(240)
@@ -30,7 +40,13 @@ def test_who_may_do_what_and_who_is_idle(people, panel, tmp_path, free_hmi):
     assert re.search(r"panel\.logged_in .* by Ana \(operator\)", output), output
     # Another process of the pages, with the shortest idle time: who touches nothing is a viewer again.
     address = free_hmi(people, STATION_HMI_IDLE_S="10")
-    typist, refused = panel(address), panel(address)
+    typist, refused, answered = panel(address), panel(address), panel(address)
+    answered.log_in("admin", "482915")
+    sent = []
+    answered.page.on("request", lambda request: sent.append(request.url) if request.url.endswith("/order") else None)
+    with next_document(answered.page):
+        answered.page.evaluate(UNKNOWN_ORDER)
+    answered.until("main", "The data sent is incomplete or invalid")
     for each in (typist, refused):
         each.log_in("admin", "482915")
         each.open("/maintenance/configuration")
@@ -43,6 +59,8 @@ def test_who_may_do_what_and_who_is_idle(people, panel, tmp_path, free_hmi):
     hasty.until(".who", "Ana")
     hasty.until(".who", "Log in")
     assert "Ana" not in hasty.text(".who")
+    answered.until(".who", "Log in")
+    assert (answered.page.url, len(sent)) == (address + "/", 1), "the order was sent again"
     # Unless that would throw away what was typed.
     typist.until(".stale-line", "You were logged out. What you typed is still here")
     assert "# half a" in text
