@@ -68,8 +68,7 @@
         const { html, headers } = await fetched(part.dataset.poll);
         const reload = part.dataset.reload;
         if (reload && headers.get("x-state") !== reload) {
-          // The effect of this page's own order: its answer is on the way, and a reload would call that off.
-          if (document.querySelector("form[data-sent]")) {
+          if (!renewal.mayReload()) {
             continue;
           }
           renewal.reload();

@@ -19,6 +19,7 @@
   const coming = new Map();
   let pressed = null;
   let pressedAt = 0;
+  let touchedAt = -Infinity;
   let lifting = 0;
   let loggedOut = false;
 
@@ -27,7 +28,9 @@
   function take(reply) {
     if (loggedOut || reply.boot !== body.dataset.boot || reply.caller !== body.dataset.caller) {
       if (!keepTyped()) {
-        reload();
+        if (mayReload()) {
+          reload();
+        }
         return;
       }
       loggedOut = true;
@@ -47,6 +50,10 @@
 
   // The answer to an order is not loaded anew: that would send the order again.
   const reload = () => ("answer" in body.dataset ? location.replace("/") : location.reload());
+
+  // Not under a finger, nor while what it pressed or this page's own order is being answered: a reload would call that off.
+  // Meanwhile what the page shows ages.
+  const mayReload = () => !document.querySelector("form[data-sent]") && performance.now() - touchedAt > STALE_MS;
 
   // What a person has typed into an order's form outlasts the log-in, to be copied; the form cannot be sent any more.
   // In the answer to an order it is the form's own: a reload would send that again.
@@ -96,6 +103,7 @@
   // A key that is held, and a second finger, begin no new time.
   const press = (event) => {
     clearTimeout(lifting);
+    touchedAt = performance.now();
     const part = event.target instanceof Element ? event.target.closest("[data-live], [data-poll]") : null;
     if (part !== pressed) {
       pressed = part;
@@ -192,7 +200,7 @@
 
   globalThis.staleness = { staleMs: STALE_MS, words: oldWords };
   globalThis.stream = { isHeard: () => !broken && performance.now() - heardAt <= STALE_MS };
-  globalThis.renewal = { fill, isPressed: (part) => part === pressed, reload };
+  globalThis.renewal = { fill, isPressed: (part) => part === pressed, mayReload, reload };
   document.addEventListener("visibilitychange", () => (document.hidden ? close() : open()));
   window.addEventListener("pagehide", close);
   window.addEventListener("pageshow", (event) => event.persisted && reload());

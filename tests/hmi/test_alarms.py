@@ -34,7 +34,7 @@ PUSHED = """
 window.EventSource = class extends EventSource {
   set onmessage(take) {
     super.onmessage = (event) => {
-      window.push = (parts) => take({data: JSON.stringify({...JSON.parse(event.data), parts})});
+      window.push = (changes) => take({data: JSON.stringify({...JSON.parse(event.data), parts: {}, ...changes})});
       push({});
     };
   }
@@ -44,21 +44,24 @@ window.EventSource = class extends EventSource {
 
 
 @pytest.mark.timeout(120)
-def test_what_a_finger_touched_is_what_it_presses_though_another_alarm_came_meanwhile(cell, panel, eventually):
-    def push(path):
-        link = f'<a class="button main" href="{path}">Details</a>'
-        shown.page.evaluate("([path, link]) => push({'alarms.not_normal': [path, link]})", [path, link])
+@pytest.mark.parametrize("meanwhile", ["an alarm", "a restart of the pages"])
+def test_what_a_finger_touched_is_what_it_presses_whatever_came_meanwhile(cell, panel, eventually, meanwhile):
+    def link_to(path):
+        return {"parts": {"alarms.not_normal": [path, f'<a class="button main" href="{path}">Details</a>']}}
 
-    shown = panel(has_touch=True)
+    shown = panel()
     shown.page.add_init_script(PUSHED)
     shown.open("/alarms")
     eventually(lambda: shown.page.evaluate("'push' in window"))
-    push("/lot")
+    shown.page.evaluate("changes => push(changes)", link_to("/lot"))
     link = shown.page.get_by_role("link", name="Details")
     box, finger = link.bounding_box(), Finger(shown.page)
     with next_document(shown.page):
         finger.down(box["x"] + 30, box["y"] + 30)
-        push("/history")
+        changes = link_to("/history") if meanwhile == "an alarm" else {"boot": "another"}
+        shown.page.evaluate("changes => push(changes)", changes)
+        for _ in range(2):  # a page that loads itself anew is gone by then
+            shown.page.evaluate("fetch('/alarms').then((answer) => answer.text())")
         finger.up()
     assert shown.page.url.endswith("/lot")
 

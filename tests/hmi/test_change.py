@@ -2,6 +2,7 @@
 
 import json
 import re
+from datetime import UTC, datetime, timedelta
 
 import pytest
 
@@ -113,6 +114,37 @@ def test_a_change_that_is_done_before_its_answer_arrives_ends_on_its_progress_an
     routes[0].fulfill(response=answer)
     operator.until("main", "The station is ready")
     assert operator.page.url.endswith("/change/progress")
+
+
+@pytest.mark.timeout(240)
+def test_a_page_of_another_state_is_loaded_anew_but_not_under_a_finger(ready, operator):
+    def polled(ms):
+        with operator.page.expect_response("**/part"):
+            clock.run_for(ms)
+
+    clock, mouse = operator.page.clock, operator.page.mouse
+    clock.install()
+    clock.pause_at(datetime.now(UTC) + timedelta(minutes=1))
+    operator.page.route("**/part", lambda route: route.fulfill(body="", headers={"x-state": "another"}))
+    operator.open("/change/3")
+    clock.run_for(500)
+    operator.page.get_by_role("button", name="Change to Raspberry").hover()
+    mouse.down()
+    polled(500)
+    polled(1000)  # after what the one before did
+    operator.page.locator("body:not(.stale)").wait_for()  # as it became by this clock alone
+    mouse.up()
+    operator.page.wait_for_url("**/change/progress")
+    ready.until(lambda state: state.recipe.number == 3)
+    operator.open("/change/2")
+    with operator.page.expect_event("load"):
+        polled(1000)
+    operator.page.locator("h1").hover()
+    mouse.down()
+    with operator.page.expect_event("load"):
+        for _ in range(3):  # a glove that lies there
+            polled(1000)
+    mouse.up()
 
 
 @pytest.mark.timeout(240)
