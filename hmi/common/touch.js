@@ -9,8 +9,25 @@
   const HERE_MS = 5000;
   // Longest wait for the pages' process before an order is sent. An estimate.
   const REACH_MS = 2000;
+  // Time after a page is shown in which a touch presses nothing, in ms: the second contact of a glove that touches twice
+  // is for the page before. An estimate.
+  const SETTLE_MS = 400;
+  const shownAt = performance.now();
   const reached = new WeakSet();
   let toldHere = 0;
+  let isEarly = false;
+
+  document.addEventListener("pointerdown", () => (isEarly = performance.now() - shownAt < SETTLE_MS), true);
+  document.addEventListener(
+    "click",
+    (event) => {
+      if (isEarly && event.pointerType === "touch") {
+        event.preventDefault();
+        event.stopImmediatePropagation();
+      }
+    },
+    true,
+  );
 
   // An order is sent once, however often the button is pressed.
   document.addEventListener("submit", (event) => {

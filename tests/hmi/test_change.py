@@ -17,8 +17,15 @@ from station.channel.panel_run import (
 from station.messages import calibration
 from station.messages.message import verbatim
 from station.settings.recipe import load_recipes
-from tests.chromium import follow
+from tests.chromium import Finger, follow
 
+PRESSED = """() => {
+  for (const name of ["click", "submit"]) {
+    const note = (event) => (window.pressed ??= []).push(`${name} ${event.target.innerText}`);
+    addEventListener(name, note, true);
+  }
+}"""
+"""Has a page note what is pressed and sent on it."""
 DUE = calibration.NEVER_VERIFIED(how=calibration.HOW_TO_VERIFY())
 
 
@@ -145,6 +152,34 @@ def test_a_page_of_another_state_is_loaded_anew_but_not_under_a_finger(ready, op
         for _ in range(3):  # a glove that lies there
             polled(1000)
     mouse.up()
+
+
+@pytest.mark.timeout(240)
+def test_the_second_contact_of_a_touch_confirms_nothing_on_the_page_that_it_opened(ready, operator, eventually):
+    def tap():
+        finger.down(*point)
+        finger.up()
+
+    page, clock, finger = operator.page, operator.page.clock, Finger(operator.page)
+    clock.install()
+    clock.pause_at(datetime.now(UTC) + timedelta(minutes=1))
+    operator.open("/change/1")
+    button = page.get_by_role("button", name="Change to Strawberry")
+    box = button.bounding_box()
+    operator.open("/change")
+    tile = page.locator("#fruit-1").bounding_box()
+    point = (tile["x"] + tile["width"] / 2, (box["y"] + tile["y"] + tile["height"]) / 2)
+    clock.run_for(500)
+    tap()
+    page.wait_for_url("**/change/1")
+    assert button.bounding_box() == box
+    page.evaluate(PRESSED)
+    tap()
+    assert eventually(lambda: page.evaluate("window.pressed")) == ["click Change to Strawberry"]
+    clock.run_for(500)
+    tap()
+    page.wait_for_url("**/change/progress")
+    ready.until(lambda state: state.recipe.number == 1)
 
 
 @pytest.mark.timeout(240)
