@@ -32,6 +32,16 @@ ARGUMENTS = (
 """Headless, in a container, without what a person's browser does in its background."""
 
 
+_LONG = """() => {
+  const any = (...names) => new Promise((done) => {
+    names.forEach((name) => addEventListener(name, () => done(), true));
+  });
+  window.longPress = any("contextmenu", "dragstart");
+  window.lifted = any("pointerup", "pointercancel");
+}"""
+"""Waits for what a long press does in Chromium, which is to open a menu or to drag a link, and for its end."""
+
+
 @contextlib.contextmanager
 def next_document(page: Page) -> Iterator[None]:
     """Wait, at the end of the block, until what was done in it has brought another document, and that is loaded.
@@ -67,6 +77,26 @@ class Finger:
 
     def _send(self, kind: str, *points: dict[str, float]) -> None:
         self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": list(points)})
+
+
+def press_long(lead: Locator) -> None:
+    """Press as a slow finger does, until Chromium takes it for a long press."""
+
+    def send(kind: str) -> None:
+        session.send("Input.emulateTouchFromMouseEvent", {"type": kind, "x": x, "y": y, "button": "left"})
+
+    box = lead.bounding_box()
+    assert box is not None
+    x, y = round(box["x"] + box["width"] / 2), round(box["y"] + box["height"] / 2)
+    lead.page.evaluate(_LONG)
+    session = lead.page.context.new_cdp_session(lead.page)
+    session.send("Emulation.setEmitTouchEventsForMouse", {"enabled": True, "configuration": "desktop"})
+    send("mousePressed")
+    lead.page.evaluate("window.longPress")
+    send("mouseReleased")
+    with contextlib.suppress(Error):  # the document is being replaced
+        lead.page.evaluate("window.lifted")
+    session.detach()
 
 
 def _until(page: Page, reached: Callable[[float, str], bool]) -> tuple[float, str]:

@@ -13,9 +13,12 @@
   // is for the page before. An estimate.
   const SETTLE_MS = 400;
   const shownAt = performance.now();
+  // What a click presses; typed fields have a menu of their own.
+  const PRESSED = "a, button:not([data-hold]), summary, [type=radio], [type=checkbox]";
   const reached = new WeakSet();
   let toldHere = 0;
   let isEarly = false;
+  let slow = null;
 
   document.addEventListener("pointerdown", () => (isEarly = performance.now() - shownAt < SETTLE_MS), true);
   document.addEventListener(
@@ -28,6 +31,23 @@
     },
     true,
   );
+
+  // A glove is slow: what is touched for half a second and more is pressed like any other. Chromium takes that for a long
+  // press, which opens a menu, and makes no click.
+  document.addEventListener("contextmenu", (event) => {
+    slow = event.pointerType === "touch" ? event.target.closest(PRESSED) : null;
+    if (slow) {
+      event.preventDefault();
+    }
+  });
+  document.addEventListener("pointercancel", () => (slow = null));
+  document.addEventListener("pointerup", (event) => {
+    const pressed = slow;
+    slow = null;
+    if (pressed && pressed.contains(document.elementFromPoint(event.clientX, event.clientY))) {
+      pressed.click();
+    }
+  });
 
   // An order is sent once, however often the button is pressed.
   document.addEventListener("submit", (event) => {
@@ -91,7 +111,13 @@
       timer = 0;
       button.classList.remove("holding");
     };
-    button.addEventListener("pointerdown", (event) => event.button === 0 && begin());
+    button.addEventListener("pointerdown", (event) => {
+      // Captured, a finger would not leave the button, wherever it went.
+      event.target.releasePointerCapture(event.pointerId);
+      if (event.button === 0) {
+        begin();
+      }
+    });
     for (const name of ["pointerup", "pointerleave", "pointercancel", "blur"]) {
       button.addEventListener(name, end);
     }

@@ -9,7 +9,7 @@ from hmi.run import charts
 from hmi.web.translation import Locale
 from station.messages import states
 from station.vocabulary import LONGEST_LOT, Reason
-from tests.chromium import follow, next_document
+from tests.chromium import Finger, follow, next_document, press_long
 
 MM_A_PX = 25.4 * 10.1 / (1280**2 + 800**2) ** 0.5
 CAPITALS_PX = """(selector) => [...document.querySelectorAll(selector)].map((each) => {
@@ -183,6 +183,41 @@ def test_what_stops_has_to_be_held_and_works_by_keyboard(ready, operator, eventu
     clock.run_for(2000)
     assert operator.page.evaluate("document.querySelectorAll('form[data-sent]').length") == 0
     assert ready.until(lambda _: True).ready, "a touch alone stops nothing"
+
+
+@pytest.mark.timeout(240)
+def test_a_slow_finger_presses_and_one_that_drifts_holds(ready, operator):
+    page, clock, finger = operator.page, operator.page.clock, Finger(operator.page)
+    outcome = ready.end(ready.begin())
+    operator.open("/")
+    tile = page.locator(f"#tile-{outcome.sequence}")
+    tile.wait_for()
+    with next_document(page):
+        press_long(tile)
+    assert page.url.endswith(f"/fruit/{outcome.sequence}")
+    ready.until(lambda state: state.ready)
+    clock.install()
+    clock.pause_at(datetime.now(UTC) + timedelta(minutes=1))
+    operator.open("/")
+    box = page.locator("#order-stop").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    finger.down(x, y)
+    finger.move(x, y + box["height"])
+    page.locator(".holding").wait_for(state="detached")
+    finger.up()
+    clock.run_for(1100)
+    assert page.locator("form[data-sent]").count() == 0
+    finger.down(x, y - 10)
+    for drift_px in range(-5, 15, 5):
+        finger.move(x, y + drift_px)
+    assert page.locator(".holding").count() == 1
+    clock.run_for(1100)
+    ready.until(lambda state: state.state == "stopped" and state.stopping)
+    finger.up()
+    start = page.locator("#order-start")
+    start.wait_for()
+    press_long(start)
+    ready.until(lambda state: state.ready)
 
 
 @pytest.mark.timeout(240)
