@@ -8,6 +8,7 @@ from playwright.sync_api import Error, Locator, Page
 
 _PATIENCE_S = 30.0
 _LOOK_AGAIN_MS = 10
+_STAYS_MS = 400
 
 _WITHOUT = (
     # They keep a process ready for the address bar's suggestions: half a second of a core for each window.
@@ -79,24 +80,36 @@ class Finger:
         self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": list(points)})
 
 
+def tap(lead: Locator) -> None:
+    """Press as a finger does."""
+    finger = Finger(lead.page)
+    finger.down(*_middle(lead))
+    finger.up()
+
+
 def press_long(lead: Locator) -> None:
-    """Press as a slow finger does, until Chromium takes it for a long press."""
+    """Press as a slow finger does: Chromium takes it for a long press, and it stays on."""
 
     def send(kind: str) -> None:
         session.send("Input.emulateTouchFromMouseEvent", {"type": kind, "x": x, "y": y, "button": "left"})
 
-    box = lead.bounding_box()
-    assert box is not None
-    x, y = round(box["x"] + box["width"] / 2), round(box["y"] + box["height"] / 2)
+    x, y = _middle(lead)
     lead.page.evaluate(_LONG)
     session = lead.page.context.new_cdp_session(lead.page)
     session.send("Emulation.setEmitTouchEventsForMouse", {"enabled": True, "configuration": "desktop"})
     send("mousePressed")
     lead.page.evaluate("window.longPress")
+    lead.page.wait_for_timeout(_STAYS_MS)
     send("mouseReleased")
     with contextlib.suppress(Error):  # the document is being replaced
         lead.page.evaluate("window.lifted")
     session.detach()
+
+
+def _middle(lead: Locator) -> tuple[int, int]:
+    box = lead.bounding_box()
+    assert box is not None
+    return round(box["x"] + box["width"] / 2), round(box["y"] + box["height"] / 2)
 
 
 def _until(page: Page, reached: Callable[[float, str], bool]) -> tuple[float, str]:

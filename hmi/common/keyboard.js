@@ -13,6 +13,11 @@
   const ACCENTS = { de: "", es: "áéíóúü¿¡", en: "" };
   const DIGITS = ["789", "456", "123", "-0.,"];
   const language = document.documentElement.lang in LETTERS ? document.documentElement.lang : "en";
+  // Time from leaving a field to the keyboard's closing, in ms: the page moves with it, which must not be before what the
+  // finger touched is pressed. An estimate.
+  const CLOSE_MS = 300;
+  let closing = 0;
+  let isTouched = false;
   let field = null;
   let layer = "letters";
   let shifted = false;
@@ -93,6 +98,7 @@
   }
 
   function open(next) {
+    clearTimeout(closing);
     field = next;
     field.dataset.mode ??= field.inputMode;
     field.inputMode = "none"; // the system's own keyboard would cover this one
@@ -110,6 +116,16 @@
     document.body.classList.remove("typing");
   }
 
-  document.addEventListener("focusin", (event) => (typed(event.target) && !event.target.matches(".pin") ? open(event.target) : close()));
-  document.addEventListener("focusout", (event) => event.target === field && close());
+  function closeLater() {
+    clearTimeout(closing);
+    closing = setTimeout(() => (isTouched ? closeLater() : close()), CLOSE_MS);
+  }
+
+  document.addEventListener("focusin", (event) =>
+    typed(event.target) && !event.target.matches(".pin") ? open(event.target) : closeLater(),
+  );
+  document.addEventListener("focusout", (event) => event.target === field && closeLater());
+  for (const name of ["pointerdown", "pointerup", "pointercancel"]) {
+    document.addEventListener(name, () => (isTouched = name === "pointerdown"));
+  }
 })();

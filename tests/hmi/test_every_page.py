@@ -5,7 +5,7 @@ import json
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
-from tests.chromium import follow
+from tests.chromium import follow, next_document, press_long, tap
 
 PAGES = (
     "/",
@@ -108,7 +108,24 @@ def test_a_panel_has_a_keyboard_on_its_screen_and_another_browser_has_none(ready
     typist.page.get_by_role("button", name="4", exact=True).click()
     assert typist.page.locator(".keyboard.digits .keycap-sign").count() == 13
     typist.page.get_by_role("button", name="Fertig").click()
-    assert typist.page.locator("[data-keyboard]").is_hidden()
+    typist.page.locator("[data-keyboard]").wait_for(state="hidden")
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("press", [tap, press_long], ids=["short", "long"])
+def test_what_is_touched_while_the_keyboard_is_open_is_pressed_by_one_touch(people, panel, press):
+    typist = panel()
+    typist.open("/panel")
+    typist.open("/history")
+    typist.page.locator("summary").first.click()
+    typist.page.locator("[name=lot]").click()
+    typist.page.get_by_role("button", name="7", exact=True).click()
+    search = typist.page.locator("form[role=search] .button.main")
+    search.evaluate("(button) => scrollBy(0, button.getBoundingClientRect().bottom - 250)")
+    assert search.bounding_box()["y"] < typist.page.locator("[data-keyboard]").bounding_box()["y"] - 100
+    with next_document(typist.page):
+        press(search)
+    assert "lot=7" in typist.page.url
 
 
 @pytest.mark.timeout(120)
