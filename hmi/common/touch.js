@@ -10,7 +10,7 @@
   // Longest wait for the pages' process before an order is sent. An estimate.
   const REACH_MS = 2000;
   // Time after a page is shown in which a touch presses nothing, in ms: the second contact of a glove that touches twice
-  // is for the page before. An estimate.
+  // is for the page before. A stop is pressed all the same. An estimate.
   const SETTLE_MS = 400;
   const shownAt = performance.now();
   // What a click presses; typed fields have a menu of their own.
@@ -24,7 +24,7 @@
   document.addEventListener(
     "click",
     (event) => {
-      if (isEarly && event.pointerType === "touch") {
+      if (isEarly && event.pointerType === "touch" && !event.target.closest("[data-stop]")) {
         event.preventDefault();
         event.stopImmediatePropagation();
       }

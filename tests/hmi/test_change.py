@@ -17,7 +17,7 @@ from station.channel.panel_run import (
 from station.messages import calibration
 from station.messages.message import verbatim
 from station.settings.recipe import load_recipes
-from tests.chromium import Finger, follow
+from tests.chromium import Finger, follow, tap
 
 PRESSED = """() => {
   for (const name of ["click", "submit"]) {
@@ -156,7 +156,7 @@ def test_a_page_of_another_state_is_loaded_anew_but_not_under_a_finger(ready, op
 
 @pytest.mark.timeout(240)
 def test_the_second_contact_of_a_touch_confirms_nothing_on_the_page_that_it_opened(ready, operator, eventually):
-    def tap():
+    def touch():
         finger.down(*point)
         finger.up()
 
@@ -170,14 +170,27 @@ def test_the_second_contact_of_a_touch_confirms_nothing_on_the_page_that_it_open
     tile = page.locator("#fruit-1").bounding_box()
     point = (tile["x"] + tile["width"] / 2, (box["y"] + tile["y"] + tile["height"]) / 2)
     clock.run_for(500)
-    tap()
+    touch()
     page.wait_for_url("**/change/1")
     assert button.bounding_box() == box
     page.evaluate(PRESSED)
-    tap()
+    touch()
     assert eventually(lambda: page.evaluate("window.pressed")) == ["click Change to Strawberry"]
     clock.run_for(500)
-    tap()
+    touch()
+    page.wait_for_url("**/change/progress")
+    ready.until(lambda state: state.recipe.number == 1)
+
+
+@pytest.mark.timeout(240)
+def test_a_stop_is_pressed_also_by_a_touch_as_early_as_a_second_contact(ready, operator):
+    page, clock = operator.page, operator.page.clock
+    clock.install()
+    clock.pause_at(datetime.now(UTC) + timedelta(minutes=1))
+    operator.open("/change/1")
+    button = page.get_by_role("button", name="Change to Strawberry")
+    button.evaluate("button => (button.dataset.stop = '')")  # as on the jog's
+    tap(button)
     page.wait_for_url("**/change/progress")
     ready.until(lambda state: state.recipe.number == 1)
 
