@@ -77,6 +77,7 @@ def test_registers_that_stay_held_after_a_cut_are_another_clients(healthy_arm, u
 
 def test_a_request_to_the_dashboard_server_that_was_given_up_is_not_sent_on(host, monkeypatch):
     """A reset in place of an end: with it the kernel discards what it would send where a cut network comes back."""
+
     async def run():
         ends: asyncio.Future[BaseException | bytes] = asyncio.get_running_loop().create_future()
 
@@ -87,9 +88,9 @@ def test_a_request_to_the_dashboard_server_that_was_given_up_is_not_sent_on(host
             writer.close()
 
         async with await asyncio.start_server(mute, host, dashboard.PORT):
-            with pytest.raises(ArmFault):
-                async with dashboard.dashboard(host) as conversation:
-                    monkeypatch.setattr(dashboard, "LINE_DEADLINE_S", 0.1)  # of this answer alone
+            async with dashboard.dashboard(host) as conversation:
+                monkeypatch.setattr(dashboard, "LINE_DEADLINE_S", 0.1)  # of this answer alone
+                with pytest.raises(ArmFault):
                     await conversation.request("brake release")
             assert isinstance(await ends, ConnectionResetError)
 
