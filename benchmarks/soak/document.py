@@ -275,12 +275,15 @@ def present(samples: Sequence[Sample]) -> list[str]:
 
 
 def undecided(samples: Sequence[Sample]) -> str:
-    """Return what is to be done about slopes that the run was too short for; empty where there are none."""
+    """Return what is to be done about slopes whose interval has the limit within it; empty where there are none."""
     after = settled(samples)
     series = [each for name in present(samples) if name != TWIN for each in memory_of(after, name)]
     if all(each.below(MOST_MB_PER_HOUR) is not Verdict.UNDECIDED for each in series):
         return ""
-    return "\n**Not decided**: the run was too short for at least one process's memory; run it for longer.\n"
+    return (
+        "\n**Not decided**: the interval of at least one process's memory has the limit within it; a longer run "
+        "narrows it.\n"
+    )
 
 
 def page(samples: Sequence[Sample], ending: Ending, minutes: float, trouble: str, load: float) -> str:
