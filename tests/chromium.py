@@ -43,6 +43,10 @@ _LONG = """() => {
 """Waits for what a long press does in Chromium, which is to open a menu or to drag a link, and for its end."""
 
 
+_SETTLED = "performance.now() - performance.getEntriesByType('navigation')[0].domContentLoadedEventEnd > 400"
+"""By SETTLE_MS of the pages' touch.js, which begins before the document's content is loaded."""
+
+
 @contextlib.contextmanager
 def next_document(page: Page) -> Iterator[None]:
     """Wait, at the end of the block, until what was done in it has brought another document, and that is loaded.
@@ -59,6 +63,12 @@ def follow(lead: Locator) -> None:
     """Click what leads to another page, and wait until that is loaded, which Playwright's own click does not."""
     with next_document(lead.page):
         lead.click()
+
+
+def settle(page: Page) -> None:
+    """Wait until a page takes a touch: one right after it is shown is the second contact of one for the page before."""
+    while not page.evaluate(_SETTLED):
+        page.wait_for_timeout(_LOOK_AGAIN_MS)
 
 
 class Finger:

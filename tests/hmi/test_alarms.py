@@ -11,7 +11,7 @@ from station.channel.line import CommandDone
 from station.channel.panel import ListedAlarm
 from station.channel.panel_run import PanelState
 from station.inspection.alarm_table import ALARMS, AlarmId
-from tests.chromium import Finger, follow, next_document
+from tests.chromium import Finger, follow, next_document, settle
 from tests.hmi.test_security import log_in
 from tests.slower_mode import SLOWER_MODE
 
@@ -56,6 +56,7 @@ def test_what_a_finger_touched_is_what_it_presses_whatever_came_meanwhile(cell, 
     shown.page.evaluate("changes => push(changes)", link_to("/lot"))
     link = shown.page.get_by_role("link", name="Details")
     box, finger = link.bounding_box(), Finger(shown.page)
+    settle(shown.page)
     with next_document(shown.page):
         finger.down(box["x"] + 30, box["y"] + 30)
         changes = link_to("/history") if meanwhile == "an alarm" else {"boot": "another"}

@@ -5,7 +5,7 @@ import json
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
-from tests.chromium import follow, next_document, press_long, tap
+from tests.chromium import follow, next_document, press_long, settle, tap
 
 PAGES = (
     "/",
@@ -123,6 +123,7 @@ def test_what_is_touched_while_the_keyboard_is_open_is_pressed_by_one_touch(peop
     search = typist.page.locator("form[role=search] .button.main")
     search.evaluate("(button) => scrollBy(0, button.getBoundingClientRect().bottom - 250)")
     assert search.bounding_box()["y"] < typist.page.locator("[data-keyboard]").bounding_box()["y"] - 100
+    settle(typist.page)
     with next_document(typist.page):
         press(search)
     assert "lot=7" in typist.page.url

@@ -60,7 +60,7 @@ def test_jogging_is_refused_out_of_manual_mode_and_done_in_it(
     page = person.go("/maintenance/hand")
     follow(page.get_by_role("button", name="Set manual mode"))
     expect(page.get_by_role("button", name="Back to production")).to_be_visible()
-    expect(page.locator("[data-stop]")).to_have_text("Stop")
+    expect(page.locator("[data-stop]")).to_have_text("Stop the fingers")
     page.get_by_label("To the width, mm").fill("40,4")
     follow(page.get_by_role("button", name="Move", exact=True))
     fingers = page.get_by_text(re.compile(r"The fingers are at [\d.]+ mm"))
