@@ -19,6 +19,7 @@
   const coming = new Map();
   let pressed = null;
   let pressedAt = 0;
+  let isLifted = true;
   let touchedAt = -Infinity;
   let lifting = 0;
   let loggedOut = false;
@@ -105,12 +106,14 @@
     clearTimeout(lifting);
     touchedAt = performance.now();
     const part = event.target instanceof Element ? event.target.closest("[data-live], [data-poll]") : null;
-    if (part !== pressed) {
+    if (part !== pressed || isLifted) {
       pressed = part;
       pressedAt = performance.now();
     }
+    isLifted = false;
   };
   const lift = (event) => {
+    isLifted = true;
     const waitsForClick = event.type === "pointerup" && event.pointerType !== "mouse";
     clearTimeout(lifting);
     lifting = setTimeout(

@@ -20,11 +20,21 @@
   let isEarly = false;
   let slow = null;
 
-  document.addEventListener("pointerdown", () => (isEarly = performance.now() - shownAt < SETTLE_MS), true);
+  const isSecondContact = (pressed) => isEarly && !pressed.closest("[data-stop]");
+  document.addEventListener(
+    "pointerdown",
+    (event) => {
+      isEarly = performance.now() - shownAt < SETTLE_MS;
+      if (event.isPrimary) {
+        slow = null;
+      }
+    },
+    true,
+  );
   document.addEventListener(
     "click",
     (event) => {
-      if (isEarly && event.pointerType === "touch" && !event.target.closest("[data-stop]")) {
+      if (event.pointerType === "touch" && isSecondContact(event.target)) {
         event.preventDefault();
         event.stopImmediatePropagation();
       }
@@ -42,9 +52,13 @@
   });
   document.addEventListener("pointercancel", () => (slow = null));
   document.addEventListener("pointerup", (event) => {
+    if (!event.isPrimary) {
+      return;
+    }
     const pressed = slow;
     slow = null;
-    if (pressed && pressed.contains(document.elementFromPoint(event.clientX, event.clientY))) {
+    const isOn = pressed && pressed.contains(document.elementFromPoint(event.clientX, event.clientY));
+    if (isOn && !isSecondContact(pressed)) {
       pressed.click();
     }
   });

@@ -82,8 +82,12 @@ async def _recipe(
     new = shown if state.submitted else state.file.recipe if state.file else None
     changes = changes_of(state.control.recipe, new) if state.control and new else ()
     drawn = None if shown is None else await _drawn(hmi, locale, shown, shown.model_dump(mode="json"))
-    # Carried out after all, an order leaves the page with another form, whose reason is another.
-    same_form = isinstance(unanswered, ApproveRecipe | RejectRecipe) == bool(state.submitted)
+    # Carried out after all, an order leaves the page with another form, whose reason is another; so does a newer
+    # revision, which this person has not seen yet.
+    if isinstance(unanswered, ApproveRecipe | RejectRecipe):
+        same_form = state.submitted is not None and state.submitted.revision == unanswered.revision
+    else:
+        same_form = state.submitted is None
     return show(
         request,
         "recipe.html.j2",

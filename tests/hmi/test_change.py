@@ -17,7 +17,7 @@ from station.channel.panel_run import (
 from station.messages import calibration
 from station.messages.message import verbatim
 from station.settings.recipe import load_recipes
-from tests.chromium import Finger, follow, tap
+from tests.chromium import Finger, follow, press_long, tap
 
 PRESSED = """() => {
   for (const name of ["click", "submit"]) {
@@ -176,6 +176,8 @@ def test_the_second_contact_of_a_touch_confirms_nothing_on_the_page_that_it_open
     page.evaluate(PRESSED)
     touch()
     assert eventually(lambda: page.evaluate("window.pressed")) == ["click Change to Strawberry"]
+    press_long(button)
+    assert page.evaluate("window.pressed") == ["click Change to Strawberry"], "nor one that stays"
     clock.run_for(500)
     touch()
     page.wait_for_url("**/change/progress")

@@ -9,7 +9,7 @@ from hmi.run import charts
 from hmi.web.translation import Locale
 from station.messages import states
 from station.vocabulary import LONGEST_LOT, Reason
-from tests.chromium import Finger, follow, next_document, press_long
+from tests.chromium import Finger, follow, next_document, press_long, settle
 
 MM_A_PX = 25.4 * 10.1 / (1280**2 + 800**2) ** 0.5
 CAPITALS_PX = """(selector) => [...document.querySelectorAll(selector)].map((each) => {
@@ -192,6 +192,7 @@ def test_a_slow_finger_presses_and_one_that_drifts_holds(ready, operator):
     operator.open("/")
     tile = page.locator(f"#tile-{outcome.sequence}")
     tile.wait_for()
+    settle(page)
     with next_document(page):
         press_long(tile)
     assert page.url.endswith(f"/fruit/{outcome.sequence}")
@@ -216,6 +217,7 @@ def test_a_slow_finger_presses_and_one_that_drifts_holds(ready, operator):
     finger.up()
     start = page.locator("#order-start")
     start.wait_for()
+    clock.run_for(500)
     press_long(start)
     ready.until(lambda state: state.ready)
 
