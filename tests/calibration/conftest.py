@@ -14,6 +14,7 @@ import cv2
 import pytest
 
 from station.calibration.calibration_procedure import CalibrationProcedure, Draft
+from station.calibration.model import Verification, stamp
 from station.calibration.report import calibration_files
 from station.calibration.rig import Place, Progress, Unit
 from station.calibration.store import CalibrationStore
@@ -131,3 +132,19 @@ def cell(tmp_path: Path, unused_port: int) -> Iterator[Site]:
     """A twin with its arm."""
     with running_twin(tmp_path, unused_port, bench=False) as made:
         yield made
+
+
+@pytest.fixture
+def verification(draft: Draft) -> Verification:
+    """One that passed, of the stored calibration."""
+    return Verification(
+        id=stamp(draft.calibration.made_at),
+        serial="T0001",
+        calibration=draft.calibration.id,
+        operator="anna",
+        passed=True,
+        area_ratio=0.98,
+        onset_mm=41.8,
+        checks=(),
+        curve=(),
+    )

@@ -9,7 +9,7 @@ from datetime import timedelta
 
 import pytest
 
-from station.calibration.model import Verification, stamp
+from station.calibration.model import stamp
 from station.calibration.verification_procedure import VerificationResult
 from station.commands import calibration_storage
 from station.commands.calibration_storage import store_calibration, store_verification
@@ -29,19 +29,8 @@ def new(draft):
 
 
 @pytest.fixture
-def verified(draft):
+def verified(draft, verification):
     """A verification with its pictures."""
-    verification = Verification(
-        id=stamp(draft.calibration.made_at),
-        serial="T0001",
-        calibration=draft.calibration.id,
-        operator="anna",
-        passed=True,
-        area_ratio=0.98,
-        onset_mm=41.8,
-        checks=(),
-        curve=(),
-    )
     return VerificationResult(verification, draft.reference, {})
 
 

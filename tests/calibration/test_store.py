@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from station.calibration.errors import CalibrationError, UnknownCalibrationError
-from station.calibration.model import GelChange, Verification, stamp
+from station.calibration.model import GelChange, stamp
 from station.calibration.report import calibration_files
 from station.calibration.store import CALIBRATIONS, CalibrationStore
 
@@ -37,21 +37,6 @@ def test_the_newest_is_the_units_and_a_broken_one_is_passed_over(stored, draft, 
     assert stored.current("T0001") == draft.calibration
     assert stored.current("T0002") is None
     assert stored.current("../T0001") is None
-
-
-@pytest.fixture
-def verification(draft):
-    return Verification(
-        id=stamp(draft.calibration.made_at),
-        serial="T0001",
-        calibration=draft.calibration.id,
-        operator="anna",
-        passed=True,
-        area_ratio=0.98,
-        onset_mm=41.8,
-        checks=(),
-        curve=(),
-    )
 
 
 def test_a_verification_belongs_to_one_calibration(stored, draft, verification):

@@ -85,6 +85,16 @@ def test_a_mode_that_nobody_can_read_is_manual(bench, settings_file, tmp_path, s
     asyncio.run(scenario())
 
 
+async def hold_with_a_cut_arm(cell):
+    """Have the station hold a fruit that it has begun to close on: the link to its arm is cut."""
+    await cell.choose("blueberry")
+    await cell.line.ready()
+    await cell.line.begin()
+    await cell.reach(State.CLOSING_TO_ONSET)
+    cell.twin.boards["arm"].set("link_cut")
+    await cell.reach(State.HELD)
+
+
 def panel_of(cell):
     """Connect to the station as the pages do."""
     return ChannelClient(panel_endpoint(cell.configuration.hmi, cell.configuration.home), "the station")
@@ -134,12 +144,7 @@ def test_manual_mode_that_still_waits_for_the_arm_is_not_set_after_a_persons_sta
 def test_another_mode_is_set_once_an_arm_that_went_home_by_itself_is_at_rest(bench, mode):
     async def scenario():
         async with bench(bench=False) as cell:
-            await cell.choose("blueberry")
-            await cell.line.ready()
-            await cell.line.begin()
-            await cell.reach(State.CLOSING_TO_ONSET)
-            cell.twin.boards["arm"].set("link_cut")
-            await cell.reach(State.HELD)
+            await hold_with_a_cut_arm(cell)
             cell.twin.boards["arm"].set("slow", 100.0)
             cell.twin.boards["arm"].clear("link_cut")
             await cell.reach(State.HOMING)
@@ -180,12 +185,7 @@ def test_manual_mode_that_the_plc_has_set_is_a_stop_for_the_person_who_orders_it
 def test_a_reset_in_manual_mode_that_is_not_done_in_time_leaves_the_arm_at_rest(bench, monkeypatch):
     async def scenario():
         async with bench(bench=False) as cell:
-            await cell.choose("blueberry")
-            await cell.line.ready()
-            await cell.line.begin()
-            await cell.reach(State.CLOSING_TO_ONSET)
-            cell.twin.boards["arm"].set("link_cut")
-            await cell.reach(State.HELD)
+            await hold_with_a_cut_arm(cell)
             assert (await cell.line.order(CommandName.SET_MODE, MANUAL)).done
             cell.twin.boards["arm"].set("slow", 100.0)
             cell.twin.boards["arm"].clear("link_cut")
