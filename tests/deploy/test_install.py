@@ -121,9 +121,7 @@ def test_a_machine_that_cannot_is_refused_with_the_remedy(tmp_path, installer, m
         patch.setattr(checks.shutil, "which", lambda name: f"/usr/bin/{name}")
         patch.setattr(checks.sys, "executable", "/usr/bin/python3.12")
         patch.setattr(checks.sys, "base_prefix", "/home/ida/uv/python3.12")
-        with pytest.raises(
-            refused, match=r"cannot run /home/ida/uv/python3\.12: it is in a person's home"
-        ):
+        with pytest.raises(refused, match=r"cannot run /home/ida/uv/python3\.12: it is in a person's home"):
             checks.check_machine(layout(Path("/")))
         patch.setattr(checks.sys, "base_prefix", "/usr")
         checks.check_machine(layout(Path("/")))
